@@ -1,0 +1,89 @@
+"""A robot's arrays as scalars, with the zeros and ones that are known before tracing.
+
+Most entries of a real robot's axes, products of inertia and anchors are zero. Where an array is not being
+traced, the places of its zeros and ones become part of the compiled program (and of its cache key), the other
+values stay data: robots that differ in values alone share one program.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from reojax._arrays import is_concrete
+from reojax._fast.scalar import Scalar, Symmetric, Vector
+from reojax.robot import Robot
+
+_FIELDS = ("mass", "com", "inertia", "axis", "anchor", "rotor_inertia", "gear_ratio")
+_UNKNOWN = 2
+
+Pattern = tuple[bytes | None, ...]
+
+
+class Components(NamedTuple):
+    """What the recursion of `omega` reads, link by link and joint by joint."""
+
+    mass: Sequence[Scalar]
+    com: Sequence[Vector]
+    inertia: Sequence[Symmetric]
+    axis: Sequence[Vector]
+    anchor: Sequence[Vector]
+    rotor_spin: Sequence[Scalar]
+    """Rotor momentum per joint rate, along the joint axis, signed by the link that carries it."""
+    parent: tuple[int, ...]
+
+
+def pattern_of(robot: Robot) -> Pattern:
+    """Where each array of `robot` holds 0, 1 or -1, as far as it can be known now; hashable."""
+    return tuple(_pattern(getattr(robot, field)) for field in _FIELDS)
+
+
+def _pattern(leaf: Any) -> bytes | None:
+    if not is_concrete(leaf):
+        return None
+    values = np.asarray(leaf)
+    known = (values == 0) | (values == 1) | (values == -1)
+    return np.where(known, values, _UNKNOWN).astype(np.int8).tobytes()
+
+
+def components(robot: Robot, pattern: Pattern, dtype: np.dtype) -> Components:
+    """Take the arrays of `robot` apart, in `dtype`, with the places of `pattern` as Python numbers."""
+    mass, com, inertia, axis, anchor, rotor, gear = (
+        _scalars(jnp.asarray(getattr(robot, field), dtype), known)
+        for field, known in zip(_FIELDS, pattern, strict=True)
+    )
+    signs = [1 if side == "parent" else -1 for side in robot.rotor_on]
+    return Components(
+        mass=mass,
+        com=com,
+        inertia=[_symmetric_part(rows) for rows in inertia],
+        axis=axis,
+        anchor=anchor,
+        rotor_spin=[sign * (j * n) for sign, j, n in zip(signs, rotor, gear, strict=True)],
+        parent=robot.parent,
+    )
+
+
+def _scalars(leaf: jax.Array, known: bytes | None) -> Any:
+    """Nested tuples of the entries of `leaf`: Python numbers where known, traced scalars elsewhere."""
+    if known is None:
+        marks = np.full(leaf.shape, _UNKNOWN)
+    else:
+        marks = np.frombuffer(known, np.int8).reshape(leaf.shape)
+
+    def take(index: tuple[int, ...]) -> Any:
+        if len(index) == leaf.ndim:
+            return leaf[index] if marks[index] == _UNKNOWN else int(marks[index])
+        return tuple(take((*index, i)) for i in range(leaf.shape[len(index)]))
+
+    return take(())
+
+
+def _symmetric_part(rows: Any) -> Symmetric:
+    def mean(a: Scalar, b: Scalar) -> Scalar:
+        return a if isinstance(a, int) and isinstance(b, int) and a == b else 0.5 * (a + b)
+
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rows
+    return (xx, yy, zz, mean(xy, yx), mean(xz, zx), mean(yz, zy))

@@ -1,0 +1,128 @@
+"""Angular velocity of the base at zero momentum, `omega = A^-1 B theta_dot` (thesis eq. 2.14), fast.
+
+One inward pass over the tree. Each link carries, in its own frame and about its own origin, what hangs
+on it: mass `m`, first moment `f`, inertia `J`, and the momentum (linear `p`, angular `h`) that the joint
+rates give while the base rests. Turning a joint by `E` and moving by its anchor `a`:
+
+    p' = E (p + rate e x f)        h' = E (h + rate J e) + rotor + a x p'
+    f' = E f + m a                 J' = E J E^T + 2 (a . g) - (a g^T + g a^T),   g = E f + m a / 2
+
+At the base, about the centre of mass, `A = J - m (|c|^2 - c c^T)` with `c = f / m`, `L = h - c x p`, and
+`A omega + L = 0`.
+"""
+
+from collections.abc import Sequence
+
+import jax
+
+from reojax._fast.components import Components
+from reojax._fast.scalar import (
+    ZERO,
+    Matrix,
+    Scalar,
+    Symmetric,
+    Vector,
+    add,
+    apply,
+    conjugate,
+    cross,
+    dot,
+    mul,
+    plus,
+    point_inertia,
+    sub,
+    times,
+)
+from reojax._fast.sincos import sincos
+
+
+def omega(robot: Components, theta: Sequence[jax.Array], rate: Sequence[jax.Array]) -> Vector:
+    """Angular velocity of the base, base frame, at joint angles `theta` and `rate`, arrays of one shape."""
+    A, momentum = locked_inertia_and_momentum(robot, [sincos(angle) for angle in theta], rate)
+    return solve(A, times(-1, momentum))
+
+
+def locked_inertia_and_momentum(
+    robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate: Sequence[Scalar]
+) -> tuple[Symmetric, Vector]:
+    """`A` of the thesis's eq. 2.14 and `-B theta_dot`, the momentum while the base does not turn."""
+    m = list(robot.mass)
+    f = [times(mass, com) for mass, com in zip(m, robot.com, strict=True)]
+    J = [plus(i, point_inertia(*mc)) for i, *mc in zip(robot.inertia, m, robot.com, strict=True)]
+    p, h = [ZERO] * len(m), [ZERO] * len(m)
+    for k in reversed(range(len(robot.parent))):
+        link, parent, e, a = k + 1, robot.parent[k], robot.axis[k], robot.anchor[k]
+        E = _joint_rotation(e, *sine_cosine[k])
+        push = apply(E, plus(p[link], times(rate[k], cross(e, f[link]))))
+        spin = apply(E, plus(h[link], times(rate[k], apply_symmetric(J[link], e))))
+        rotor = times(mul(rate[k], robot.rotor_spin[k]), e)
+        moment = apply(E, f[link])
+        p[parent] = plus(p[parent], push)
+        h[parent] = plus(h[parent], plus(plus(spin, rotor), cross(a, push)))
+        J[parent] = plus(J[parent], plus(conjugate(E, J[link]), _shift(m[link], moment, a)))
+        f[parent] = plus(f[parent], plus(moment, times(m[link], a)))
+        m[parent] = add(m[parent], m[link])
+    total = 1 / m[0]
+    A = plus(J[0], times(-1, point_inertia(total, f[0])))
+    return A, plus(h[0], times(mul(-1, total), cross(f[0], p[0])))
+
+
+def apply_symmetric(s: Symmetric, a: Vector) -> Vector:
+    """Return `s @ a` for a symmetric matrix."""
+    xx, yy, zz, xy, xz, yz = s
+    return (dot((xx, xy, xz), a), dot((xy, yy, yz), a), dot((xz, yz, zz), a))
+
+
+def _joint_rotation(e: Vector, s: Scalar, c: Scalar) -> Matrix:
+    """Rotation by the angle of sine `s` and cosine `c` about the unit vector `e` (Rodrigues)."""
+    x, y, z = e
+    versine = sub(1, c)
+
+    def diagonal(a: Scalar) -> Scalar:
+        known_unit = isinstance(a, int) and abs(a) == 1
+        return 1 if known_unit else add(c, mul(versine, mul(a, a)))
+
+    def pair(a: Scalar, b: Scalar, other: Scalar) -> tuple[Scalar, Scalar]:
+        even, odd = mul(versine, mul(a, b)), mul(s, other)
+        return sub(even, odd), add(even, odd)
+
+    (xy, yx), (zx, xz), (yz, zy) = pair(x, y, z), pair(z, x, y), pair(y, z, x)
+    return ((diagonal(x), xy, xz), (yx, diagonal(y), yz), (zx, zy, diagonal(z)))
+
+
+def _shift(mass: Scalar, moment: Vector, a: Vector) -> Symmetric:
+    """What moving by `a` adds to the inertia of a body of `mass` and first `moment`."""
+    g = plus(moment, times(mul(0.5, mass), a))
+    x, y, z = (mul(p, q) for p, q in zip(a, g, strict=True))
+    products = tuple(add(mul(a[i], g[j]), mul(a[j], g[i])) for i, j in ((0, 1), (0, 2), (1, 2)))
+    return (*times(2, (add(y, z), add(x, z), add(x, y))), *times(-1, products))
+
+
+@jax.custom_jvp
+def solve(A: Symmetric, right: Vector) -> Vector:
+    """Solve `A x = right`, `A` symmetric positive definite, by its adjugate.
+
+    Derivative: from `dA x + A dx = d right` follows `dx = A^-1 (d right - dA x)`, another solve with
+    the same matrix instead of the derivative of the cofactors.
+    """
+    xx, yy, zz, xy, xz, yz = A
+    adjugate = (
+        yy * zz - yz * yz,
+        xx * zz - xz * xz,
+        xx * yy - xy * xy,
+        xz * yz - xy * zz,
+        xy * yz - xz * yy,
+        xy * xz - xx * yz,
+    )
+    determinant = xx * adjugate[0] + xy * adjugate[3] + xz * adjugate[4]
+    x, y, z = apply_symmetric(adjugate, right)
+    return x / determinant, y / determinant, z / determinant
+
+
+@solve.defjvp
+def _solve_jvp(primals, tangents):
+    A, right = primals
+    dA, dright = tangents
+    x = solve(A, right)
+    dx = solve(A, tuple(d - t for d, t in zip(dright, apply_symmetric(dA, x), strict=True)))
+    return x, dx

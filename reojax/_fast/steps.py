@@ -1,0 +1,131 @@
+"""From omega at the nodes of a step to the rotation over the step: `R' = R hat(omega)`, order 12 quadrature.
+
+The equation is linear, so all nodes of all steps are evaluated beforehand, at once. With six Gauss nodes s_i
+in a step and time scaled to it, three changes of frame make what is left to integrate smaller and smaller:
+
+1. Mean: with `wbar` the mean of omega over the step, `R = exp(wbar / 2) Q exp((s - 1/2) wbar)` leaves
+   `Q' = Q hat(u)`,   `u = exp((s - 1/2) wbar) (omega - wbar)`.
+2. Fer (F. Fer, Bull. Acad. Roy. Belg. 44, 818-829, 1958): with `U(s)` the integral of u from 0 to s,
+   `Q = P exp(U(s))` leaves `P' = P hat(v)`, `v = (exp(U) - J(U)) u` with J the left Jacobian of exp: the
+   commutator `U x u / 2` and beyond, of second order in u.
+3. Magnus: `P(1) = exp(m_0 + (m_0 x m_1 + m_1 x m_2) / 2)`, with m_n the integral of v times the n-th Legendre
+   polynomial: the second term of the Magnus series, half the integral of `V x v`.
+
+The rotation over the step is `exp(wbar / 2) P(1) exp(U(1)) exp(wbar / 2)`. Integrals are products with
+constant 6x6 matrices; on CPU a matrix product is also what makes XLA store its operand once instead of
+computing it again for every reader.
+"""
+
+from math import factorial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from reojax._fast.product import Quaternion, times
+from reojax._fast.sincos import horner, sincos
+
+Triple = tuple[jax.Array, jax.Array, jax.Array]
+
+_x, _w = np.polynomial.legendre.leggauss(6)
+NODES: np.ndarray = 0.5 * (_x + 1)
+"""Where omega is evaluated in a step, as fractions of the step."""
+_LEGENDRE = np.polynomial.legendre.legvander(_x, len(_x) - 1)
+_MOMENTS = 0.5 * _w[:, None] * _LEGENDRE[:, :3]
+"""values (..., 6) @ _MOMENTS = integrals of the values times the first three Legendre polynomials."""
+_MEAN = _MOMENTS[:, :1]
+
+
+def _running_integral() -> np.ndarray:
+    antiderivatives = [
+        np.polynomial.legendre.legval(_x, np.polynomial.legendre.legint(row, lbnd=-1)) for row in np.eye(len(_x))
+    ]
+    return 0.5 * np.linalg.solve(_LEGENDRE.T, np.array(antiderivatives))
+
+
+_INTEGRAL = _running_integral()
+"""values (..., 6) @ _INTEGRAL = integrals of the values from the step's start to each node."""
+
+_COS0 = tuple((-1) ** k / factorial(2 * k) for k in range(8))
+_SIN1 = tuple((-1) ** k / factorial(2 * k + 1) for k in range(8))  # sin t / t in t^2
+_COS2 = tuple((-1) ** k / factorial(2 * k + 2) for k in range(8))  # (1 - cos t) / t^2
+_SIN3 = tuple((-1) ** k / factorial(2 * k + 3) for k in range(8))  # (t - sin t) / t^3
+_FER_1 = tuple(a - b for a, b in zip(_SIN1, _COS2, strict=True))
+_FER_2 = tuple(a - b for a, b in zip(_COS2, _SIN3, strict=True))
+_SERIES_END = 10.0
+"""Angles within a step stay below this root (180 degrees) or the step is too long for six nodes anyway."""
+
+
+def _dot(a: Triple, b: Triple) -> jax.Array:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Triple, b: Triple) -> Triple:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _integrate(values: Triple, matrix: np.ndarray) -> Triple:
+    constant = jnp.asarray(matrix, values[0].dtype)
+    x, y, z = (jax.lax.dot(v, constant, precision=jax.lax.Precision.HIGHEST) for v in values)
+    return x, y, z
+
+
+def _combine(*terms: tuple[jax.Array | float, Triple]) -> Triple:
+    x, y, z = (sum(c * v[i] for c, v in terms) for i in range(3))
+    return x, y, z
+
+
+def step_rotation(omega: Triple) -> Quaternion:
+    """Rotation over each step from omega at its nodes.
+
+    Args:
+        omega: three arrays (steps, 6), angular velocity times the step's duration at `NODES`.
+
+    Returns:
+        Four arrays (steps,), unit quaternions.
+    """
+    mean = _integrate(omega, _MEAN)
+    u = _to_mean_frame(omega, mean)
+    v = _fer(u, _integrate(u, _INTEGRAL))
+    last = _column(_integrate(u, _MEAN), 0)
+    m = _integrate(v, _MOMENTS)
+    m0, m1, m2 = (_column(m, n) for n in range(3))
+    first = _combine((1.0, m0), (0.5, _cross(m0, m1)), (0.5, _cross(m1, m2)))
+    half = _exp(_combine((0.5, _column(mean, 0))))
+    return times(times(half, times(_exp_small(first), _exp_small(last))), half)
+
+
+def _column(values: Triple, n: int) -> Triple:
+    return (values[0][:, n], values[1][:, n], values[2][:, n])
+
+
+def _to_mean_frame(omega: Triple, mean: Triple) -> Triple:
+    s = jnp.asarray(NODES - 0.5, omega[0].dtype)[None, :]
+    rest = _combine((1.0, omega), (-1.0, mean))
+    square = jnp.minimum(s * s * _dot(mean, mean), _SERIES_END)
+    p = _cross(mean, rest)
+    return _combine((1.0, rest), (s * horner(_SIN1, square), p), (s * s * horner(_COS2, square), _cross(mean, p)))
+
+
+def _fer(u: Triple, turned: Triple) -> Triple:
+    square = jnp.minimum(_dot(turned, turned), _SERIES_END)
+    p = _cross(turned, u)
+    return _combine((horner(_FER_1, square), p), (horner(_FER_2, square), _cross(turned, p)))
+
+
+def _exp_small(vector: Triple) -> Quaternion:
+    """Quaternion of a rotation vector below a turn, by power series."""
+    square = jnp.minimum(0.25 * _dot(vector, vector), _SERIES_END)
+    k = 0.5 * horner(_SIN1, square)
+    return horner(_COS0, square), k * vector[0], k * vector[1], k * vector[2]
+
+
+def _exp(vector: Triple) -> Quaternion:
+    """Quaternion of a rotation vector of any length."""
+    square = 0.25 * _dot(vector, vector)
+    small = square < 1e-4
+    angle = jnp.sqrt(jnp.where(small, 1.0, square))
+    s, c = sincos(angle)
+    near = jnp.where(small, square, 0.0)
+    k = 0.5 * jnp.where(small, horner(_SIN1[:4], near), s / angle)
+    return jnp.where(small, horner(_COS0[:4], near), c), k * vector[0], k * vector[1], k * vector[2]

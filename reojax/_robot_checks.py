@@ -1,0 +1,133 @@
+"""The door of `make_robot`: plain numbers in, checked NumPy arrays out, or a `ValueError`."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+_TOLERANCE = 1e-6
+"""Relative rounding allowed in unit lengths, symmetry and the triangle rule (float32 data pass)."""
+
+
+def numbers(entry: str, value: Any, shape: tuple[int, ...], *, finite: bool = True) -> np.ndarray:
+    """Return `value` as a float64 array of `shape` (-1: any length); no NaN, and no infinity if `finite`."""
+    text = str(shape).replace("-1", "n")
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in "iuf":  # digits in strings, truth values and complex numbers would convert
+            raise TypeError(f"dtype {given.dtype}")
+        array = given.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        message = f"`{entry}` must be an array of real numbers of shape {text}; got {value!r}."
+        raise ValueError(message) from error
+    if array.ndim != len(shape) or any(n not in (-1, m) for n, m in zip(shape, array.shape, strict=True)):
+        raise ValueError(f"`{entry}` has shape {array.shape}; it must be {text}.")
+    bad = ~np.isfinite(array) if finite else np.isnan(array)
+    refuse(entry, array, bad, "it must be a finite number" if finite else "it must be a number")
+    return array
+
+
+def refuse(entry: str, array: np.ndarray, bad: np.ndarray, rule: str, unit: str = "") -> None:
+    """Raise a `ValueError` for the first True of `bad`, with the entry's index, value and rule."""
+    if bad.any():
+        index = tuple(int(i) for i in np.argwhere(bad)[0])
+        where = ", ".join(map(str, index))
+        raise ValueError(f"{entry}[{where}] is {array[index].tolist()}{unit}; {rule}.")
+
+
+def _listed(entry: str, value: Any, default: Sequence[Any], what: str) -> tuple[Any, ...]:
+    if value is None:
+        return tuple(default)
+    items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else None
+    if items is None or len(items) != len(default):
+        raise ValueError(f"`{entry}` is {value!r}; it must list {what}.")
+    return items
+
+
+def _names(entry: str, value: Any, default: list[str]) -> tuple[str, ...]:
+    names = _listed(entry, value, default, f"{len(default)} names")
+    for k, name in enumerate(names):
+        if not isinstance(name, str) or not name:
+            raise ValueError(f"{entry}[{k}] is {name!r}; it must be a non-empty string.")
+        if name in names[:k]:
+            raise ValueError(f"{entry}[{k}] is {name!r}, which is taken; names must differ.")
+    return names
+
+
+def _parents(value: Any, joints: int) -> tuple[int, ...]:
+    parents = _listed("parent", value, range(joints), f"the link that each of {joints} joints hangs from")
+    for k, parent in enumerate(parents):
+        if isinstance(parent, bool) or not isinstance(parent, int | np.integer) or not 0 <= parent <= k:
+            raise ValueError(
+                f"parent[{k}] is {parent!r}; joint {k} carries link {k + 1}, so its parent must be a link "
+                f"that comes before: an integer from 0 to {k}."
+            )
+    return tuple(int(p) for p in parents)
+
+
+def _sides(value: Any, joints: int) -> tuple[str, ...]:
+    rule = f"'parent' or 'child' for each of {joints} joints"
+    sides = _listed("rotor_on", value, ("parent",) * joints, rule)
+    for k, side in enumerate(sides):
+        if side not in ("parent", "child"):
+            raise ValueError(f"rotor_on[{k}] is {side!r}; it must be 'parent' or 'child'.")
+    return tuple(str(side) for side in sides)
+
+
+def _inertias(value: Any, links: int) -> np.ndarray:
+    inertia = numbers("inertia", value, (links, 3, 3))
+    for i, matrix in enumerate(inertia):
+        if np.abs(matrix - matrix.T).max() > _TOLERANCE * np.abs(matrix).max():
+            raise ValueError(f"inertia[{i}] is {matrix.tolist()}; it must be symmetric.")
+        small, middle, large = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
+        if small <= 0 or large > (small + middle) * (1 + _TOLERANCE):
+            raise ValueError(
+                f"inertia[{i}] has principal moments {small:.6g}, {middle:.6g}, {large:.6g} kg m^2; a rigid body's "
+                "are positive and none is larger than the sum of the other two."
+            )
+    return 0.5 * (inertia + inertia.swapaxes(1, 2))
+
+
+def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str, Any]:
+    """Check the arguments of `make_robot`; return the fields of `Robot`, defaults filled in."""
+    mass = numbers("mass", mass, (-1,))
+    refuse("mass", mass, mass <= 0, "a link's mass must be positive", " kg")
+    links, joints = len(mass), len(mass) - 1
+    if not links:
+        raise ValueError("`mass` is empty; a robot has at least one link.")
+    axis = numbers("axis", axis, (joints, 3))
+    length = np.linalg.norm(axis, axis=1)
+    for k in np.flatnonzero(np.abs(length - 1) > _TOLERANCE):
+        raise ValueError(f"axis[{k}] is {axis[k].tolist()}, of length {length[k]:.9g}; it must have unit length.")
+
+    def per_joint(entry: str, default: float, **kind: Any) -> np.ndarray:
+        value = entries[entry]
+        return numbers(entry, np.full(joints, default) if value is None else value, (joints,), **kind)
+
+    rotor_inertia = per_joint("rotor_inertia", 0.0)
+    refuse("rotor_inertia", rotor_inertia, rotor_inertia < 0, "it must not be negative", " kg m^2")
+    lower = per_joint("lower", -np.inf, finite=False)
+    upper = per_joint("upper", np.inf, finite=False)
+    refuse("lower", lower, lower >= upper, "it must be below `upper`", " rad")
+    if not isinstance(name, str):
+        raise ValueError(f"`name` is {name!r}; it must be a string.")
+    fields = {
+        "mass": mass,
+        "com": numbers("com", entries["com"], (links, 3)),
+        "inertia": _inertias(entries["inertia"], links),
+        "axis": axis / length[:, None],
+        "anchor": numbers("anchor", entries["anchor"], (joints, 3)),
+        "parent": _parents(entries["parent"], joints),
+        "rotor_inertia": rotor_inertia,
+        "gear_ratio": per_joint("gear_ratio", 1.0),
+        "rotor_on": _sides(entries["rotor_on"], joints),
+        "lower": lower,
+        "upper": upper,
+        "link_names": _names("link_names", entries["link_names"], [f"link{i}" for i in range(links)]),
+        "joint_names": _names("joint_names", entries["joint_names"], [f"joint{k}" for k in range(joints)]),
+        "name": name,
+    }
+    for field in fields.values():
+        if isinstance(field, np.ndarray):
+            field.setflags(write=False)
+    return fields

@@ -1,0 +1,165 @@
+"""Angular momentum of a free-floating robot: `A(theta) omega = B(theta) theta_dot` (thesis eq. 2.14).
+
+With zero momentum, angular velocity `omega` of the base and joint rates `theta_dot` are tied by the
+*local connection* `A^-1 B`, which depends on the shape `theta` alone. This module is the definition,
+written to be read; `reojax._fast` evaluates the same equations quickly and is tested against it.
+
+Notation (thesis 1.5, 2.5), all in the base frame: `rotation[i]`, `centre[i]` are link i's orientation
+and its centre of mass measured from the centre of mass of the whole robot; `turn[i]` (3, j) and
+`shift[i]` (3, j) are its angular and linear Jacobians, `w_i = omega + turn[i] theta_dot` and
+`v_i = omega x centre[i] + shift[i] theta_dot`. The momentum about the centre of mass is
+
+    h = sum_i I_i w_i + m_i centre_i x v_i + sum_k J_k (+-N_k theta_dot_k) e_k  =  A omega - B theta_dot,
+
+the last sum over the motors' rotors, which spin about their joints' axes `e_k` relative to the
+links that carry them.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from reojax._arrays import Array, common_float
+from reojax._smallmat import solve_symmetric3
+from reojax.robot import Robot
+from reojax.so3 import hat
+
+
+class Kinematics(NamedTuple):
+    """Where the links are at a shape, and how they move with it, in the base frame."""
+
+    rotation: Float[Array, "n 3 3"]
+    """Orientation of each link."""
+    origin: Float[Array, "n 3"]
+    """Origin of each link's frame, from the base frame's origin [m]."""
+    centre: Float[Array, "n 3"]
+    """Centre of mass of each link, from the centre of mass of the robot [m]."""
+    turn: Float[Array, "n 3 j"]
+    """Angular Jacobian: angular velocity of each link relative to the base per joint rate."""
+    shift: Float[Array, "n 3 j"]
+    """Linear Jacobian of `centre` [m/rad]."""
+    axis: Float[Array, "j 3"]
+    """Joint axes."""
+
+
+class MomentumMatrices(NamedTuple):
+    """`A` and `B` of `A omega = B theta_dot`, base frame, about the centre of mass [kg m^2]."""
+
+    A: Float[Array, "3 3"]
+    """Locked inertia of the robot; symmetric, positive definite."""
+    B: Float[Array, "3 j"]
+    """Minus the momentum that unit joint rates give while the base does not turn."""
+
+
+def _as_arrays(robot: Robot, *motion: Array) -> tuple[Robot, ...]:
+    dtype = common_float(robot, motion)
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), (robot, *motion))
+
+
+def _check(robot: Robot, **motion: Array) -> None:
+    for entry, value in motion.items():
+        expected = (3,) if entry == "omega" else (robot.joints,)
+        if jnp.shape(value) != expected:
+            raise ValueError(
+                f"`{entry}` has shape {jnp.shape(value)}; for {robot.name!r} ({robot.joints} joints) it must be {expected}."
+            )
+
+
+def joint_rotation(axis: Float[Array, "3"], angle: Float[Array, ""]) -> Float[Array, "3 3"]:
+    """Rotation by `angle` [rad] about the unit vector `axis` (Rodrigues)."""
+    c, s = jnp.cos(angle), jnp.sin(angle)
+    return c * jnp.eye(3, dtype=axis.dtype) + s * hat(axis) + (1 - c) * jnp.outer(axis, axis)
+
+
+def kinematics(robot: Robot, theta: Float[Array, " j"]) -> Kinematics:
+    """Poses and Jacobians of all links at joint angles `theta` [rad], in the base frame.
+
+    Raises:
+        ValueError: if `theta` has the wrong shape.
+    """
+    _check(robot, theta=theta)
+    robot, theta = _as_arrays(robot, theta)
+    zero = jnp.zeros((3, robot.joints), theta.dtype)
+    rotation, origin, axis = [jnp.eye(3, dtype=theta.dtype)], [zero[:, :0].sum(1)], []
+    turn, shift = [zero], [zero]  # `shift` of the link's origin, base at rest
+    for k, p in enumerate(robot.parent):
+        axis.append(rotation[p] @ robot.axis[k])
+        arm = rotation[p] @ robot.anchor[k]
+        rotation.append(rotation[p] @ joint_rotation(robot.axis[k], theta[k]))
+        origin.append(origin[p] + arm)
+        turn.append(turn[p].at[:, k].set(axis[k]))
+        shift.append(shift[p] - hat(arm) @ turn[p])
+    lever = [r @ c for r, c in zip(rotation, robot.com, strict=True)]
+    centre = jnp.stack([o + d for o, d in zip(origin, lever, strict=True)])
+    centre_shift = jnp.stack([s - hat(d) @ t for s, d, t in zip(shift, lever, turn, strict=True)])
+    share = robot.mass / robot.mass.sum()
+    return Kinematics(
+        rotation=jnp.stack(rotation),
+        origin=jnp.stack(origin),
+        centre=centre - (share @ centre)[None],
+        turn=jnp.stack(turn),
+        shift=centre_shift - jnp.einsum("i,iaj->aj", share, centre_shift)[None],
+        axis=jnp.stack(axis) if axis else jnp.zeros((0, 3), theta.dtype),
+    )
+
+
+def momentum_matrices(robot: Robot, theta: Float[Array, " j"]) -> MomentumMatrices:
+    """Matrices of `A omega = B theta_dot` at zero angular momentum (thesis eq. 2.14).
+
+    Args:
+        robot: the robot.
+        theta: (j,) joint angles [rad].
+
+    Returns:
+        `A` (3, 3) and `B` (3, j) [kg m^2], in the base frame, about the centre of mass.
+
+    Raises:
+        ValueError: if `theta` has the wrong shape.
+    """
+    pose = kinematics(robot, theta)
+    robot, theta = _as_arrays(robot, theta)
+    A = jnp.zeros((3, 3), theta.dtype)
+    B = jnp.zeros((3, robot.joints), theta.dtype)
+    for i in range(robot.links):
+        inertia = pose.rotation[i] @ (0.5 * (robot.inertia[i] + robot.inertia[i].T)) @ pose.rotation[i].T
+        lever = hat(pose.centre[i])
+        A = A + inertia - robot.mass[i] * lever @ lever
+        B = B - inertia @ pose.turn[i] - robot.mass[i] * lever @ pose.shift[i]
+    for k, side in enumerate(robot.rotor_on):
+        spin = robot.gear_ratio[k] if side == "parent" else -robot.gear_ratio[k]
+        B = B.at[:, k].add(-robot.rotor_inertia[k] * spin * pose.axis[k])
+    return MomentumMatrices(A, B)
+
+
+def connection(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "3 j"]:
+    """Local connection `A^-1 B`: column k is the base's turn per turn of joint k, base frame.
+
+    `omega = connection(robot, theta) @ theta_dot` at zero angular momentum (thesis 2.5).
+
+    Raises:
+        ValueError: if `theta` has the wrong shape.
+    """
+    A, B = momentum_matrices(robot, theta)
+    return solve_symmetric3(A, B)
+
+
+def angular_momentum(
+    robot: Robot, theta: Float[Array, " j"], theta_dot: Float[Array, " j"], omega: Float[Array, "3"]
+) -> Float[Array, "3"]:
+    """Total angular momentum `A omega - B theta_dot` about the centre of mass, base frame [kg m^2/s].
+
+    Args:
+        robot: the robot.
+        theta: (j,) joint angles [rad].
+        theta_dot: (j,) joint rates [rad/s].
+        omega: (3,) angular velocity of the base, base frame [rad/s].
+
+    Raises:
+        ValueError: if an argument has the wrong shape.
+    """
+    _check(robot, theta=theta, theta_dot=theta_dot, omega=omega)
+    robot, theta, theta_dot, omega = _as_arrays(robot, theta, theta_dot, omega)
+    A, B = momentum_matrices(robot, theta)
+    return A @ omega - B @ theta_dot

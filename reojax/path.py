@@ -1,0 +1,62 @@
+"""Paths in shape space: what the joints go through, without when (thesis 2.4: only the path matters)."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from reojax._arrays import Array, is_concrete
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
+class Path:
+    """A path in shape space, made of straight edges between waypoints; built by `polygon`."""
+
+    waypoints: Float[Array, "v j"]
+    """Corners in order, joint angles [rad]."""
+
+    @property
+    def edges(self) -> int:
+        """Number of straight edges, one less than the number of waypoints."""
+        return self.waypoints.shape[0] - 1
+
+    @property
+    def joints(self) -> int:
+        """Number of joint angles in a waypoint."""
+        return self.waypoints.shape[1]
+
+
+def polygon(waypoints: ArrayLike) -> Path:
+    """Path of straight edges between `waypoints`, in order.
+
+    Args:
+        waypoints: (v, j) joint angles [rad], v >= 1. One waypoint alone is a path that stays put;
+            a sampled curve may have thousands.
+
+    Raises:
+        ValueError: if the waypoints are not numbers, not of shape (v, j), or not finite.
+    """
+    on_device = any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(waypoints))
+    try:
+        points = jnp.asarray(waypoints) if on_device else np.asarray(waypoints)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"`waypoints` must be a (v, j) array of numbers; got {waypoints!r}.") from error
+    if points.ndim != 2 or not points.shape[0]:
+        raise ValueError(f"`waypoints` has shape {points.shape}; it must be (v, j) with at least one waypoint.")
+    if not (np.issubdtype(points.dtype, np.floating) or np.issubdtype(points.dtype, np.integer)):
+        raise ValueError(f"`waypoints` has dtype {points.dtype}; joint angles must be real numbers.")
+    if np.issubdtype(points.dtype, np.integer):
+        points = points.astype(float)
+    if is_concrete(points) and not np.isfinite(points).all():
+        row, joint = np.argwhere(~np.isfinite(np.asarray(points)))[0]
+        raise ValueError(f"waypoints[{row}, {joint}] is {points[row, joint]}; joint angles must be finite.")
+    return Path(points)
+
+
+def joint_travel(path: Path) -> Float[Array, ""]:
+    """Sum over all joints of the angle each one moves through along the path [rad]."""
+    return abs(path.waypoints[1:] - path.waypoints[:-1]).sum()

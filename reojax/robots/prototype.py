@@ -1,0 +1,242 @@
+"""The four-link robot of the thesis (chapter 2.6), and its three design parameters (figures 2.8 and 2.9).
+
+At `theta = 0` the robot is straight and the long axis is z:
+
+    z ^    link 0: end link, an L: shank along z and foot near -y      <- base, the thesis's link 1
+      |    ---- joint 0, twist, about -z
+      |    link 1: middle link
+      |    ---- joint 1, bend, about +x
+      |    link 2: middle link
+      |    ---- joint 2, twist, about -z
+           link 3: end link, a second copy of link 0 turned by half a turn about y
+
+Base frame: origin on joint 0. **Roll is about z** (the first angle of `so3.to_euler_zxz`), **yaw about y, pitch
+about x** (the bend axis). The twist axes point from the base outwards along the chain, which makes the roll of
+manoeuvre A have the sign of its twist: `manoeuvre_a(+270 deg, .)` rolls by a positive angle, as measured in the
+thesis (+3.35 rad), whichever way the centre bends. Positive bend folds the robot away from its feet; this is the
+bend of the fit below. Negative bend folds it towards them, and rolls more.
+
+**Published** (thesis 2.6 and the grids of figures 2.8 and 2.9): total mass, end link inertia, rotor inertia, gear
+ratio, the motors of joints 0 and 2 inside links 1 and 2, and one motor for the centre joint, whose rotor is the
+one thing that tells the halves of an otherwise balanced robot apart. It is chosen to sit in link 1.
+
+**Chosen** is everything in `Chosen`, because the thesis keeps it in a CAD model: sizes, split of the mass, shape of
+the end links. Both end links are one part used twice, so the robot has the symmetry of a half turn about y. The foot
+leaves the bending plane (y-z) by `foot_angle`: as a mirror image of each other the two ends would make A a pure roll,
+however they are built, and the thesis sees off-axis rotation. `experiments/fit_prototype.py` fits length, radius and
+foot angle, and the values here are the fitted ones, rounded.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike
+
+from reojax._arrays import is_concrete
+from reojax.robot import Robot, make_robot
+from reojax.robots._solids import Solid, cube, cylinder, half_turn_y, join
+
+TOTAL_MASS = 0.3
+"""Mass of the robot [kg] (thesis 2.6)."""
+END_INERTIA = 70e-6
+"""Inertia of an end link about its distal joint's axis [kg m^2] (thesis figures 2.8 and 2.9)."""
+ROTOR_INERTIA = 0.1e-6
+"""Inertia of a motor's rotor [kg m^2] (thesis 2.6, maxon RE-max 17)."""
+GEAR_RATIO = 24.0
+"""Rotor turns per joint turn (thesis 2.6)."""
+TWIST_LIMIT = np.deg2rad(270)
+"""Largest angle of the distal joints, either way [rad] (the range of thesis figures 1.9 and 2.7)."""
+BEND_LIMIT = np.deg2rad(120)
+"""Largest angle of the centre joint, either way [rad] (the range of thesis figures 1.9 and 2.7)."""
+
+
+class Chosen(NamedTuple):
+    """What the thesis does not publish; every number here is chosen."""
+
+    middle_length: float = 0.133
+    """Length of a middle link, distal joint to centre joint [m]; fitted."""
+    middle_radius: float = 0.0153
+    """Radius of a middle link, taken as a uniform cylinder [m]; fitted. It has to house a 17 mm motor."""
+    foot_angle: float = 0.227
+    """Angle by which the first foot leaves the bending plane, from -y towards +x [rad]; fitted."""
+    middle_mass: float = 0.09
+    """Mass of a middle link, motors included [kg]."""
+    shank_mass: float = 0.04
+    """Mass of the shank of an end link [kg]."""
+    foot_mass: float = 0.008
+    """Mass of the foot of an end link, without the steel insert, which has the rest of the total mass [kg]."""
+    shank_length: float = 0.05
+    """Length of the shank, from the distal joint to the foot [m]."""
+    rod_radius: float = 0.006
+    """Radius of shank and foot [m]."""
+    insert_side: float = 0.012
+    """Side of the steel insert, a cube at the far end of the foot [m]."""
+
+    @property
+    def insert_mass(self) -> float:
+        """Mass of a steel insert [kg]: what the other parts leave of the published total."""
+        return TOTAL_MASS / 2 - self.middle_mass - self.shank_mass - self.foot_mass
+
+    @property
+    def foot_length(self) -> float:
+        """Distance from the distal joint's axis to the insert [m], set by the published end link inertia."""
+        thick = self.shank_mass * self.rod_radius**2 / 2 + self.foot_mass * self.rod_radius**2 / 4
+        thick += self.insert_mass * self.insert_side**2 / 6
+        return float(np.sqrt((END_INERTIA - thick) / (self.foot_mass / 3 + self.insert_mass)))
+
+    @property
+    def foot_direction(self) -> np.ndarray:
+        """(3,) where the first foot points, unit length."""
+        return np.array([np.sin(self.foot_angle), -np.cos(self.foot_angle), 0.0])
+
+
+def prototype(chosen: Chosen | None = None) -> Robot:
+    """Build the thesis's prototype: four links, three joints, L-shaped end links (thesis 2.6).
+
+    Frames, signs and sources are in this module's docstring. Manoeuvre A at 270/120 degrees rolls it by
+    185 degrees, unwrapped, and tips its roll axis by 3.
+
+    Args:
+        chosen: the unpublished numbers; default the fitted ones.
+
+    Raises:
+        ValueError: if they make a link that no body can have.
+    """
+    chosen = Chosen() if chosen is None else chosen
+    middle = middle_link(chosen)
+    first = _end_link(chosen)
+    links = (first, middle, middle, half_turn_y(first))
+    to_next = (0.0, 0.0, -chosen.middle_length)
+    return make_robot(
+        mass=[link.mass for link in links],
+        com=[link.com for link in links],
+        inertia=[link.inertia for link in links],
+        axis=[(0, 0, -1), (1, 0, 0), (0, 0, -1)],
+        anchor=[(0, 0, 0), to_next, to_next],
+        rotor_inertia=[ROTOR_INERTIA] * 3,
+        gear_ratio=[GEAR_RATIO] * 3,
+        rotor_on=["child", "parent", "parent"],  # links 1, 1, 2: thesis 2.6, the middle one chosen
+        lower=[-TWIST_LIMIT, -BEND_LIMIT, -TWIST_LIMIT],
+        upper=[TWIST_LIMIT, BEND_LIMIT, TWIST_LIMIT],
+        joint_names=["twist1", "bend", "twist2"],
+        name="prototype",
+    )
+
+
+def middle_link(chosen: Chosen) -> Solid:
+    """Middle link, hanging along -z from its inboard joint at the origin."""
+    length = chosen.middle_length
+    return cylinder(
+        chosen.middle_mass, chosen.middle_radius, length, centre=(0, 0, -length / 2), along=(0, 0, 1)
+    )
+
+
+def shank(chosen: Chosen, *, start: float) -> Solid:
+    """Shank of an end link, along z, its lower end at height `start` [m]."""
+    centre = (0, 0, start + chosen.shank_length / 2)
+    return cylinder(chosen.shank_mass, chosen.rod_radius, chosen.shank_length, centre=centre, along=(0, 0, 1))
+
+
+def foot(chosen: Chosen, *, heel: ArrayLike, along: ArrayLike) -> Solid:
+    """Foot with its steel insert, from `heel` [m] in direction `along` (unit length)."""
+    heel, along = np.asarray(heel, float), np.asarray(along, float)
+    length = chosen.foot_length
+    rod = cylinder(
+        chosen.foot_mass, chosen.rod_radius, length, centre=tuple(heel + along * length / 2), along=tuple(along)
+    )
+    return join(rod, cube(chosen.insert_mass, chosen.insert_side, centre=tuple(heel + along * length)))
+
+
+def _end_link(chosen: Chosen) -> Solid:
+    """First end link, standing along +z on joint 0 at the origin."""
+    top = np.array([0.0, 0.0, chosen.shank_length])
+    return join(shank(chosen, start=0.0), foot(chosen, heel=top, along=chosen.foot_direction))
+
+
+def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
+    """Return the prototype with another inertia of its end links about their distal joints (thesis figure 2.8).
+
+    The mass of each end link is moved straight towards or away from its joint axis, all of it by the same factor
+    `sqrt(inertia / present inertia)`: a foot of another length with the same steel insert. Mass and heights along
+    the axis stay, and the result is a possible rigid body at any positive inertia. The identity at the present one.
+
+    Args:
+        robot: the prototype, or a changed copy of it.
+        inertia: inertia of either end link about its distal joint's axis [kg m^2]; may be traced.
+
+    Raises:
+        ValueError: if the robot has not four links, or `inertia` is not one positive number.
+    """
+    if robot.links != 4:
+        raise ValueError(f"{robot.name!r} has {robot.links} links; end links are defined for the four-link robot.")
+    xp, cast = _like(robot, inertia)
+    inertia = cast(inertia)
+    if inertia.shape or (is_concrete(inertia) and not inertia > 0):
+        raise ValueError(f"`inertia` is {inertia}; it must be one positive number, in kg m^2.")
+    mass, com, moment, axes, anchor = map(cast, (robot.mass, robot.com, robot.inertia, robot.axis, robot.anchor))
+    eye = np.eye(3, dtype=com.dtype)
+
+    def stretched(link: int, axis: Any, point: Any) -> tuple[Any, Any]:
+        along = axis[:, None] * axis[None, :]
+        across = eye - along
+        lever = com[link] - point
+        present = (along * moment[link]).sum() + mass[link] * (lever @ across @ lever)
+        stretch = xp.sqrt(inertia / present) * across + along
+        spread = stretch @ (xp.trace(moment[link]) / 2 * eye - moment[link]) @ stretch  # second moments of mass
+        return point + stretch @ lever, xp.trace(spread) * eye - spread
+
+    first, last = stretched(0, axes[0], anchor[0]), stretched(3, axes[2], xp.zeros_like(com[3]))
+    return robot.replace(
+        com=xp.stack([first[0], com[1], com[2], last[0]]),
+        inertia=xp.stack([first[1], moment[1], moment[2], last[1]]),
+    )
+
+
+def with_gear_ratio(robot: Robot, ratio: ArrayLike) -> Robot:
+    """Return a copy of any robot with another gear ratio (thesis figure 2.9).
+
+    Args:
+        robot: the robot.
+        ratio: rotor turns per joint turn, one for all joints or (j,); may be traced.
+
+    Raises:
+        ValueError: if `ratio` has another shape or is not finite.
+    """
+    return robot.replace(gear_ratio=_per_joint(robot, "ratio", ratio))
+
+
+def with_rotor_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
+    """Return a copy of any robot with another rotor inertia (thesis figure 2.9).
+
+    Only the rotors' spin counts: the links' own inertias stay as they are.
+
+    Args:
+        robot: the robot.
+        inertia: inertia of a rotor about its spin axis [kg m^2], one for all joints or (j,); may be traced.
+
+    Raises:
+        ValueError: if `inertia` has another shape, is negative or not finite.
+    """
+    return robot.replace(rotor_inertia=_per_joint(robot, "inertia", inertia, least=0.0))
+
+
+def _per_joint(robot: Robot, entry: str, value: ArrayLike, least: float = -np.inf) -> Any:
+    xp, cast = _like(robot, value)
+    array = cast(value)
+    if array.shape not in ((), (robot.joints,)):
+        raise ValueError(f"`{entry}` has shape {array.shape}; it must be one number or ({robot.joints},).")
+    if is_concrete(array) and not (np.isfinite(array) & (array >= least)).all():
+        rule = "finite" if least == -np.inf else "finite and not negative"
+        raise ValueError(f"`{entry}` is {array}; it must be {rule}.")
+    return xp.broadcast_to(array, (robot.joints,))
+
+
+def _like(robot: Robot, value: Any) -> tuple[Any, Any]:
+    """Array module and cast for an edit: NumPy unless JAX arrays are about, and the lowest float around."""
+    leaves = [leaf for leaf in (*jax.tree.leaves(robot), value) if hasattr(leaf, "dtype")]
+    xp = jnp if any(isinstance(leaf, jax.Array) for leaf in leaves) else np
+    floats = [leaf.dtype for leaf in leaves if jnp.issubdtype(leaf.dtype, jnp.floating)]
+    dtype = min(floats, key=lambda d: d.itemsize)
+    return xp, lambda array: xp.asarray(array, dtype)
