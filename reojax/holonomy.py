@@ -12,10 +12,9 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from reojax._arrays import Array, common_float
-from reojax._fast.components import Pattern, components, pattern_of
-from reojax._fast.omega import omega
-from reojax._fast.product import Quaternion, cumulative_product, ordered_product
-from reojax._fast.steps import NODES, step_rotation
+from reojax._fast.components import Pattern, pattern_of
+from reojax._fast.endpoint import end_rotation, steps_of_path
+from reojax._fast.product import ordered_products, to_matrix
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -76,50 +75,24 @@ def _check(robot: Robot, path: Path, entry: str, count: int) -> None:
 
 @partial(jax.jit, static_argnums=(2, 3))
 def _net_rotation(robot: Robot, waypoints: Array, steps: int, pattern: Pattern) -> jax.Array:
-    if waypoints.shape[0] == 1 or not robot.joints:
-        return jnp.eye(3, dtype=common_float(robot, waypoints))
-    return _matrix(ordered_product(_step_rotations(robot, waypoints, steps, pattern)))
+    robot, points = _as_arrays(robot, waypoints)
+    if points.shape[0] == 1 or not robot.joints:
+        return jnp.eye(3, dtype=points.dtype)
+    return end_rotation(steps, pattern, robot, points)
 
 
 @partial(jax.jit, static_argnums=(2, 3))
 def _rotation_history(robot: Robot, waypoints: Array, samples: int, pattern: Pattern) -> jax.Array:
-    start = jnp.eye(3, dtype=common_float(robot, waypoints))[None]
-    edges = waypoints.shape[0] - 1
+    robot, points = _as_arrays(robot, waypoints)
+    edges = points.shape[0] - 1
     if not robot.joints or not edges:
-        return jnp.tile(start, (edges * samples + 1, 1, 1))
+        return jnp.tile(jnp.eye(3, dtype=points.dtype), (edges * samples + 1, 1, 1))
     finer = -(-DEFAULT_STEPS // samples)
-    turned = cumulative_product(_step_rotations(robot, waypoints, samples * finer, pattern))
-    history = jax.vmap(_matrix)(tuple(q[finer - 1 :: finer] for q in turned))
-    return jnp.concatenate([start, history])
+    end, before = ordered_products(steps_of_path(robot, points, samples * finer, pattern).rotation)
+    history = jax.vmap(to_matrix)(tuple(q[::finer] for q in before))
+    return jnp.concatenate([history, to_matrix(end)[None]])
 
 
-def _step_rotations(robot: Robot, waypoints: Array, steps: int, pattern: Pattern) -> Quaternion:
-    """Rotation over each of the `steps` steps of each edge, in order."""
+def _as_arrays(robot: Robot, waypoints: Array) -> tuple[Robot, jax.Array]:
     dtype = common_float(robot, waypoints)
-    points = jnp.asarray(waypoints, dtype)
-    change = points[1:] - points[:-1]
-    fraction = jnp.asarray((jnp.arange(steps)[:, None] + NODES) / steps, dtype)
-    shape = (change.shape[0] * steps, len(NODES))
-    theta, rate = [], []
-    for k in range(robot.joints):
-        start, by = points[:-1, k, None, None], change[:, k, None, None]
-        theta.append((start + by * fraction[None]).reshape(shape))
-        rate.append(jnp.broadcast_to(by / steps, (*by.shape[:1], *fraction.shape)).reshape(shape))
-    return step_rotation(omega(components(robot, pattern, dtype), theta, rate))
-
-
-def _matrix(q: Quaternion) -> jax.Array:
-    w, x, y, z = q
-    return jnp.stack(
-        [
-            1 - 2 * (y * y + z * z),
-            2 * (x * y - w * z),
-            2 * (x * z + w * y),
-            2 * (x * y + w * z),
-            1 - 2 * (x * x + z * z),
-            2 * (y * z - w * x),
-            2 * (x * z - w * y),
-            2 * (y * z + w * x),
-            1 - 2 * (x * x + y * y),
-        ]
-    ).reshape(3, 3)
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), (robot, waypoints))

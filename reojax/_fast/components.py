@@ -73,12 +73,14 @@ def _scalars(leaf: jax.Array, known: bytes | None) -> Any:
     else:
         marks = np.frombuffer(known, np.int8).reshape(leaf.shape)
 
-    def take(index: tuple[int, ...]) -> Any:
-        if len(index) == leaf.ndim:
-            return leaf[index] if marks[index] == _UNKNOWN else int(marks[index])
-        return tuple(take((*index, i)) for i in range(leaf.shape[len(index)]))
-
-    return take(())
+    # `split`, unlike indexing, has a cheap transpose: one concatenation
+    pieces = jax.lax.split(leaf.reshape(-1), (1,) * leaf.size) if leaf.size else []
+    entries = [
+        piece.reshape(()) if mark == _UNKNOWN else int(mark) for piece, mark in zip(pieces, marks.flat, strict=True)
+    ]
+    for size in reversed(leaf.shape[1:]):
+        entries = [tuple(entries[i : i + size]) for i in range(0, len(entries), size)]
+    return entries
 
 
 def _symmetric_part(rows: Any) -> Symmetric:

@@ -8,10 +8,11 @@ rates give while the base rests. Turning a joint by `E` and moving by its anchor
     f' = E f + m a                 J' = E J E^T + 2 (a . g) - (a g^T + g a^T),   g = E f + m a / 2
 
 At the base, about the centre of mass, `A = J - m (|c|^2 - c c^T)` with `c = f / m`, `L = h - c x p`, and
-`A omega + L = 0`.
+`A omega + L = 0`. The derivative of all this is in `derivative`.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import jax
 
@@ -36,23 +37,34 @@ from reojax._fast.scalar import (
 from reojax._fast.sincos import sincos
 
 
+class Base(NamedTuple):
+    """What the inward pass finds at the base, for the whole robot."""
+
+    inertia: Symmetric
+    """`A` of the thesis's eq. 2.14, about the centre of mass."""
+    momentum: Vector
+    """`L = -B theta_dot`, angular momentum about the centre of mass while the base rests."""
+    centre: Vector
+    """Centre of mass, from the base frame's origin."""
+    drift: Vector
+    """Velocity of the centre of mass while the base rests."""
+
+
 def omega(robot: Components, theta: Sequence[jax.Array], rate: Sequence[jax.Array]) -> Vector:
     """Angular velocity of the base, base frame, at joint angles `theta` and `rate`, arrays of one shape."""
-    A, momentum = locked_inertia_and_momentum(robot, [sincos(angle) for angle in theta], rate)
-    return solve(A, times(-1, momentum))
+    base = inward(robot, [sincos(angle) for angle in theta], rate)
+    return solve(base.inertia, times(-1, base.momentum))
 
 
-def locked_inertia_and_momentum(
-    robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate: Sequence[Scalar]
-) -> tuple[Symmetric, Vector]:
-    """`A` of the thesis's eq. 2.14 and `-B theta_dot`, the momentum while the base does not turn."""
+def inward(robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate: Sequence[Scalar]) -> Base:
+    """Gather inertia and momentum from the tips to the base."""
     m = list(robot.mass)
     f = [times(mass, com) for mass, com in zip(m, robot.com, strict=True)]
     J = [plus(i, point_inertia(*mc)) for i, *mc in zip(robot.inertia, m, robot.com, strict=True)]
     p, h = [ZERO] * len(m), [ZERO] * len(m)
     for k in reversed(range(len(robot.parent))):
         link, parent, e, a = k + 1, robot.parent[k], robot.axis[k], robot.anchor[k]
-        E = _joint_rotation(e, *sine_cosine[k])
+        E = joint_rotation(e, *sine_cosine[k])
         push = apply(E, plus(p[link], times(rate[k], cross(e, f[link]))))
         spin = apply(E, plus(h[link], times(rate[k], apply_symmetric(J[link], e))))
         rotor = times(mul(rate[k], robot.rotor_spin[k]), e)
@@ -62,9 +74,13 @@ def locked_inertia_and_momentum(
         J[parent] = plus(J[parent], plus(conjugate(E, J[link]), _shift(m[link], moment, a)))
         f[parent] = plus(f[parent], plus(moment, times(m[link], a)))
         m[parent] = add(m[parent], m[link])
-    total = 1 / m[0]
-    A = plus(J[0], times(-1, point_inertia(total, f[0])))
-    return A, plus(h[0], times(mul(-1, total), cross(f[0], p[0])))
+    centre, drift = times(1 / m[0], f[0]), times(1 / m[0], p[0])
+    return Base(
+        inertia=plus(J[0], times(-1, point_inertia(m[0], centre))),
+        momentum=plus(h[0], times(-1, cross(centre, p[0]))),
+        centre=centre,
+        drift=drift,
+    )
 
 
 def apply_symmetric(s: Symmetric, a: Vector) -> Vector:
@@ -73,7 +89,7 @@ def apply_symmetric(s: Symmetric, a: Vector) -> Vector:
     return (dot((xx, xy, xz), a), dot((xy, yy, yz), a), dot((xz, yz, zz), a))
 
 
-def _joint_rotation(e: Vector, s: Scalar, c: Scalar) -> Matrix:
+def joint_rotation(e: Vector, s: Scalar, c: Scalar) -> Matrix:
     """Rotation by the angle of sine `s` and cosine `c` about the unit vector `e` (Rodrigues)."""
     x, y, z = e
     versine = sub(1, c)
@@ -98,31 +114,17 @@ def _shift(mass: Scalar, moment: Vector, a: Vector) -> Symmetric:
     return (*times(2, (add(y, z), add(x, z), add(x, y))), *times(-1, products))
 
 
-@jax.custom_jvp
 def solve(A: Symmetric, right: Vector) -> Vector:
-    """Solve `A x = right`, `A` symmetric positive definite, by its adjugate.
-
-    Derivative: from `dA x + A dx = d right` follows `dx = A^-1 (d right - dA x)`, another solve with
-    the same matrix instead of the derivative of the cofactors.
-    """
+    """Solve `A x = right`, `A` symmetric positive definite, by its adjugate."""
     xx, yy, zz, xy, xz, yz = A
     adjugate = (
-        yy * zz - yz * yz,
-        xx * zz - xz * xz,
-        xx * yy - xy * xy,
-        xz * yz - xy * zz,
-        xy * yz - xz * yy,
-        xy * xz - xx * yz,
+        sub(mul(yy, zz), mul(yz, yz)),
+        sub(mul(xx, zz), mul(xz, xz)),
+        sub(mul(xx, yy), mul(xy, xy)),
+        sub(mul(xz, yz), mul(xy, zz)),
+        sub(mul(xy, yz), mul(xz, yy)),
+        sub(mul(xy, xz), mul(xx, yz)),
     )
-    determinant = xx * adjugate[0] + xy * adjugate[3] + xz * adjugate[4]
+    determinant = dot((xx, xy, xz), (adjugate[0], adjugate[3], adjugate[4]))
     x, y, z = apply_symmetric(adjugate, right)
     return x / determinant, y / determinant, z / determinant
-
-
-@solve.defjvp
-def _solve_jvp(primals, tangents):
-    A, right = primals
-    dA, dright = tangents
-    x = solve(A, right)
-    dx = solve(A, tuple(d - t for d, t in zip(dright, apply_symmetric(dA, x), strict=True)))
-    return x, dx

@@ -97,3 +97,9 @@ def point_inertia(mass: Scalar, d: Vector) -> Symmetric:
     xx, yy, zz = mul(x, x), mul(y, y), mul(z, z)
     products = (mul(x, y), mul(x, z), mul(y, z))
     return times(mass, (add(yy, zz), add(xx, zz), add(xx, yy), *times(-1, products)))
+
+
+def transpose(matrix: Matrix) -> Matrix:
+    """Return the transposed matrix."""
+    x, y, z = zip(*matrix, strict=True)
+    return (x, y, z)

@@ -16,35 +16,31 @@ constant 6x6 matrices; on CPU a matrix product is also what makes XLA store its 
 computing it again for every reader.
 """
 
+from collections.abc import Callable
 from math import factorial
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from reojax._fast.product import Quaternion, times
+from reojax._fast.nodes import LEGENDRE, NODES, WEIGHTS, per_step
+from reojax._fast.product import Quaternion, Triple, times
 from reojax._fast.sincos import horner, sincos
 
-Triple = tuple[jax.Array, jax.Array, jax.Array]
-
-_x, _w = np.polynomial.legendre.leggauss(6)
-NODES: np.ndarray = 0.5 * (_x + 1)
-"""Where omega is evaluated in a step, as fractions of the step."""
-_LEGENDRE = np.polynomial.legendre.legvander(_x, len(_x) - 1)
-_MOMENTS = 0.5 * _w[:, None] * _LEGENDRE[:, :3]
-"""values (..., 6) @ _MOMENTS = integrals of the values times the first three Legendre polynomials."""
-_MEAN = _MOMENTS[:, :1]
+_MOMENTS = WEIGHTS[:, None] * LEGENDRE[:, :3]
+"""values (steps, 6) @ _MOMENTS = integrals of the values times the first three Legendre polynomials."""
+_MEAN_AT_NODES = np.repeat(WEIGHTS[:, None], len(NODES), axis=1)
 
 
 def _running_integral() -> np.ndarray:
-    antiderivatives = [
-        np.polynomial.legendre.legval(_x, np.polynomial.legendre.legint(row, lbnd=-1)) for row in np.eye(len(_x))
-    ]
-    return 0.5 * np.linalg.solve(_LEGENDRE.T, np.array(antiderivatives))
+    legendre = np.polynomial.legendre
+    antiderivatives = [legendre.legval(2 * NODES - 1, legendre.legint(row, lbnd=-1)) for row in np.eye(len(NODES))]
+    return 0.5 * np.linalg.solve(LEGENDRE.T, np.array(antiderivatives))
 
 
 _INTEGRAL = _running_integral()
-"""values (..., 6) @ _INTEGRAL = integrals of the values from the step's start to each node."""
+"""values (steps, 6) @ _INTEGRAL = integrals of the values from the step's start to each node."""
 
 _COS0 = tuple((-1) ** k / factorial(2 * k) for k in range(8))
 _SIN1 = tuple((-1) ** k / factorial(2 * k + 1) for k in range(8))  # sin t / t in t^2
@@ -64,10 +60,15 @@ def _cross(a: Triple, b: Triple) -> Triple:
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-def _integrate(values: Triple, matrix: np.ndarray) -> Triple:
-    constant = jnp.asarray(matrix, values[0].dtype)
-    x, y, z = (jax.lax.dot(v, constant, precision=jax.lax.Precision.HIGHEST) for v in values)
+def _at_nodes(values: Triple, matrix: np.ndarray) -> Triple:
+    x, y, z = (per_step(v, matrix).reshape(-1) for v in values)
     return x, y, z
+
+
+def _moments(values: Triple, count: int) -> list[Triple]:
+    """Integrals over each step of three arrays of nodes, times the first Legendre polynomials."""
+    x, y, z = (per_step(v, _MOMENTS[:, :count]) for v in values)
+    return [(x[:, n], y[:, n], z[:, n]) for n in range(count)]
 
 
 def _combine(*terms: tuple[jax.Array | float, Triple]) -> Triple:
@@ -75,32 +76,46 @@ def _combine(*terms: tuple[jax.Array | float, Triple]) -> Triple:
     return x, y, z
 
 
-def step_rotation(omega: Triple) -> Quaternion:
-    """Rotation over each step from omega at its nodes.
+class Step(NamedTuple):
+    """Rotations over steps and inside them; `R(s) = half @ inside(s)` from a step's start, all unit quaternions."""
+
+    rotation: Quaternion
+    """Over the whole step, four arrays (steps,)."""
+    half: Quaternion
+    """`exp(wbar / 2)`, four arrays (steps,)."""
+    inside: Callable[[], Quaternion]
+    """`P(s) exp(U(s)) exp((s - 1/2) wbar)` at the nodes, four arrays of nodes."""
+
+
+def step_rotations(omega: Triple) -> Step:
+    """Solve `R' = R hat(omega)` over each step.
 
     Args:
-        omega: three arrays (steps, 6), angular velocity times the step's duration at `NODES`.
-
-    Returns:
-        Four arrays (steps,), unit quaternions.
+        omega: angular velocity times the step's duration at the nodes of all steps, three arrays (steps * 6,).
     """
-    mean = _integrate(omega, _MEAN)
-    u = _to_mean_frame(omega, mean)
-    v = _fer(u, _integrate(u, _INTEGRAL))
-    last = _column(_integrate(u, _MEAN), 0)
-    m = _integrate(v, _MOMENTS)
-    m0, m1, m2 = (_column(m, n) for n in range(3))
+    s = jnp.asarray(np.tile(NODES - 0.5, omega[0].shape[0] // len(NODES)), omega[0].dtype)
+    mean = _at_nodes(omega, _MEAN_AT_NODES)
+    u = _to_mean_frame(s, omega, mean)
+    turned = _at_nodes(u, _INTEGRAL)
+    v = _fer(u, turned)
+    m0, m1, m2 = _moments(v, 3)
     first = _combine((1.0, m0), (0.5, _cross(m0, m1)), (0.5, _cross(m1, m2)))
-    half = _exp(_combine((0.5, _column(mean, 0))))
-    return times(times(half, times(_exp_small(first), _exp_small(last))), half)
+    half = _exp(_combine((0.5, _moments(omega, 1)[0])))
+    rotation = times(times(half, times(_exp_small(first), _exp_small(_moments(u, 1)[0]))), half)
+
+    def inside() -> Quaternion:
+        fer = times(_exp_small(_at_nodes(v, _INTEGRAL)), _exp_small(turned))
+        return times(fer, _exp_small(_combine((s, mean))))
+
+    return Step(rotation, half, inside)
 
 
-def _column(values: Triple, n: int) -> Triple:
-    return (values[0][:, n], values[1][:, n], values[2][:, n])
+def mean_over_step(values: Triple) -> Triple:
+    """Mean over each step, arrays (steps,), of three arrays of nodes."""
+    return _moments(values, 1)[0]
 
 
-def _to_mean_frame(omega: Triple, mean: Triple) -> Triple:
-    s = jnp.asarray(NODES - 0.5, omega[0].dtype)[None, :]
+def _to_mean_frame(s: jax.Array, omega: Triple, mean: Triple) -> Triple:
     rest = _combine((1.0, omega), (-1.0, mean))
     square = jnp.minimum(s * s * _dot(mean, mean), _SERIES_END)
     p = _cross(mean, rest)

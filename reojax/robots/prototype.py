@@ -55,19 +55,19 @@ BEND_LIMIT = np.deg2rad(120)
 class Chosen(NamedTuple):
     """What the thesis does not publish; every number here is chosen."""
 
-    middle_length: float = 0.133
+    middle_length: float = 0.0543
     """Length of a middle link, distal joint to centre joint [m]; fitted."""
-    middle_radius: float = 0.0153
+    middle_radius: float = 0.0235
     """Radius of a middle link, taken as a uniform cylinder [m]; fitted. It has to house a 17 mm motor."""
-    foot_angle: float = 0.227
-    """Angle by which the first foot leaves the bending plane, from -y towards +x [rad]; fitted."""
-    middle_mass: float = 0.09
+    foot_angle: float = 0.244
+    """Angle by which the first foot leaves the bending plane, from +y towards -x [rad]; fitted."""
+    middle_mass: float = 0.105
     """Mass of a middle link, motors included [kg]."""
-    shank_mass: float = 0.04
+    shank_mass: float = 0.022
     """Mass of the shank of an end link [kg]."""
     foot_mass: float = 0.008
     """Mass of the foot of an end link, without the steel insert, which has the rest of the total mass [kg]."""
-    shank_length: float = 0.05
+    shank_length: float = 0.035
     """Length of the shank, from the distal joint to the foot [m]."""
     rod_radius: float = 0.006
     """Radius of shank and foot [m]."""
@@ -89,7 +89,7 @@ class Chosen(NamedTuple):
     @property
     def foot_direction(self) -> np.ndarray:
         """(3,) where the first foot points, unit length."""
-        return np.array([np.sin(self.foot_angle), -np.cos(self.foot_angle), 0.0])
+        return np.array([-np.sin(self.foot_angle), np.cos(self.foot_angle), 0.0])
 
 
 def prototype(chosen: Chosen | None = None) -> Robot:

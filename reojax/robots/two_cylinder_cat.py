@@ -19,14 +19,14 @@ def two_cylinder_cat(axial_to_transverse: float) -> Robot:
     T. R. Kane and M. P. Scher, "A dynamical explanation of the falling cat phenomenon", Int. J. Solids Structures 5
     (1969). Bent by the angle g, with both halves rolled once about their own axes, the cat turns about z by
 
-        2 pi j cos(g/2) / (sin^2(g/2) + j cos^2(g/2)),    j = `axial_to_transverse`,
+        2 pi j cos(g/2) / (sin^2(g/2) + j cos^2(g/2)),    j = `axial_to_transverse`.
 
-    and `manoeuvre_a(2 pi, g)` is that loop: bend, a full turn of both spin joints, unbend; its last edge turns the
-    spin joints back in the straight pose, where the halves stay at rest. The formula counts the turn in full: it may
-    exceed half a turn.
+    `manoeuvre_a(-2 pi, g)` is that loop, and `manoeuvre_a(2 pi, g)` the opposite turn: bend, a full turn of both spin
+    joints, unbend; the last edge turns the spin joints back in the straight pose, where the halves stay at rest. Along
+    the way the base makes a full turn the other way with its own spin, which leaves its net rotation as it is.
 
-    Axes and signs as on the prototype: roll about z, yaw about y, pitch and bend (joint 1) about x; joints 0 and 2
-    spin the halves about -z; a positive twist rolls the cat by a positive angle. Base: front half, frame on joint 0.
+    Axes as on the prototype: roll about z, yaw about y, pitch about x; joints 0 and 2 spin the halves about -z, joint
+    1 bends about x. Base: front half, frame on joint 0. No joint limits.
 
     *Why it is exact.* A hinge that both bends and rolls needs a waist link between bend and spin, which must have some
     mass. Each half is one uniform cylinder, shared out: the waist link has a tenth of its mass and inertia, and a

@@ -1,0 +1,46 @@
+"""What the command line, the experiments and the benchmarks set before they compute; the library sets nothing."""
+
+import os
+from pathlib import Path
+
+import jax
+
+CACHE_BYTES = 2**30
+"""Bound on the compilation cache, kept by removing the oldest programs at the start."""
+
+
+def start() -> None:
+    """Switch float64 on, and keep compiled programs for the next run.
+
+    They go to `$XDG_CACHE_HOME/reojax/jax` (default `~/.cache/reojax/jax`), unless `REOJAX_CACHE` is 0, a cache has
+    been set already (`JAX_COMPILATION_CACHE_DIR`), or the folder cannot be written.
+    """
+    jax.config.update("jax_enable_x64", True)
+    if os.environ.get("REOJAX_CACHE") == "0" or jax.config.jax_compilation_cache_dir:
+        return
+    try:
+        folder = cache_folder()
+        folder.mkdir(parents=True, exist_ok=True)
+        _trim(folder, CACHE_BYTES)
+    except (OSError, RuntimeError):  # no home, no permission, a file in the way
+        return
+    if os.access(folder, os.W_OK | os.X_OK):
+        jax.config.update("jax_compilation_cache_dir", str(folder))
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+
+
+def cache_folder() -> Path:
+    """Folder of the compilation cache."""
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return (base if base.is_absolute() else Path.home() / ".cache") / "reojax" / "jax"
+
+
+def _trim(folder: Path, limit: int) -> None:
+    """Remove the oldest files until `limit` bytes are left. (JAX's own bound needs a further package.)"""
+    files = [(file.stat(), file) for file in folder.iterdir() if file.is_file()]
+    excess = sum(stat.st_size for stat, _ in files) - limit
+    for stat, file in sorted(files, key=lambda item: item[0].st_mtime):
+        if excess <= 0:
+            break
+        file.unlink(missing_ok=True)
+        excess -= stat.st_size

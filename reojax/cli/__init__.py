@@ -1,0 +1,60 @@
+"""The command line, `reojax` or `python -m reojax`: one module per subcommand, listed in `COMMANDS`.
+
+A subcommand's module has a docstring, whose first line is its help, `add_arguments(parser)` and `run(args)`. It
+imports what computes inside `run`, so that help and mistyped arguments are answered at once. Results go to stdout;
+a picture or file is written before they are printed. Exit status: 0 done, 2 bad input (one line on stderr),
+130 interrupted.
+"""
+
+import os
+import sys
+from collections.abc import Sequence
+from importlib import metadata
+
+from reojax.cli import simulate
+from reojax.cli._arguments import BadInput, Parser, joined
+
+COMMANDS = {"simulate": simulate}
+"""Subcommands by name."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line with `argv` (default: the process's arguments) and return its exit status."""
+    try:
+        args = _parser().parse_args(joined(sys.argv[1:] if argv is None else argv))
+        args.run(args)
+        sys.stdout.flush()
+    except BadInput as error:
+        print(error, file=sys.stderr)
+        return 2
+    except SystemExit as stop:  # argparse, after --help and --version
+        return int(stop.code or 0)
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:  # the reader of stdout has enough; Python flushes once more when it ends
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 0
+
+
+def version() -> str:
+    """Version of the installed package."""
+    try:
+        return metadata.version("reojax")
+    except metadata.PackageNotFoundError:
+        return "(not installed)"
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        prog="reojax",
+        description="How a robot in free fall turns itself with its own joints.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"reojax {version()}")
+    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, module in COMMANDS.items():
+        text = (module.__doc__ or "").partition("\n")[0]
+        command = subparsers.add_parser(name, help=text, description=text, allow_abbrev=False)
+        module.add_arguments(command)
+        command.set_defaults(run=module.run)
+    return parser

@@ -1,0 +1,53 @@
+"""What the subcommands share: the error for bad input, the parser, and the reading of angles."""
+
+import argparse
+import math
+from collections.abc import Sequence
+from typing import NoReturn
+
+LARGEST_ANGLE = 36000.0
+"""Largest amplitude at the command line [deg]: a hundred turns."""
+
+
+class BadInput(Exception):
+    """Something the user gave cannot be used; its text is the one line that says so."""
+
+
+class Parser(argparse.ArgumentParser):
+    """`ArgumentParser` that raises `BadInput` with one line, without the usage."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise `BadInput`, led by the command's name."""
+        raise BadInput(f"{self.prog}: {message}")
+
+
+def degrees(text: str) -> float:
+    """Read an angle in degrees (an argparse type)."""
+    try:
+        angle = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not math.isfinite(angle):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
+    if abs(angle) > LARGEST_ANGLE:
+        raise argparse.ArgumentTypeError(f"{text!r} is beyond {LARGEST_ANGLE:g} degrees")
+    return angle
+
+
+def joined(arguments: Sequence[str]) -> list[str]:
+    """Join each option to a negative number after it, all of which argparse would not know: `--bend=-1e2`."""
+    result: list[str] = []
+    for argument in arguments:
+        if result and result[-1].startswith("--") and "=" not in result[-1] and _negative(argument):
+            result[-1] += f"={argument}"
+        else:
+            result.append(argument)
+    return result
+
+
+def _negative(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return text.startswith("-")
