@@ -1,4 +1,4 @@
-"""What the command line, the experiments and the benchmarks set before they compute; the library sets nothing."""
+"""What command line, experiments and benchmarks set before they compute; the library sets nothing."""
 
 import os
 from pathlib import Path
@@ -12,11 +12,11 @@ CACHE_BYTES = 2**30
 def start() -> None:
     """Switch float64 on, and keep compiled programs for the next run.
 
-    They go to `$XDG_CACHE_HOME/reojax/jax` (default `~/.cache/reojax/jax`), unless `REOJAX_CACHE` is 0, a cache has
-    been set already (`JAX_COMPILATION_CACHE_DIR`), or the folder cannot be written.
+    They go to `$XDG_CACHE_HOME/reojax/jax` (default `~/.cache/reojax/jax`), unless `REOJAX_CACHE` is 0, a
+    cache has been set already (`JAX_COMPILATION_CACHE_DIR`), or the folder cannot be written.
     """
     jax.config.update("jax_enable_x64", True)
-    if os.environ.get("REOJAX_CACHE") == "0" or jax.config.jax_compilation_cache_dir:
+    if os.environ.get("REOJAX_CACHE") == "0" or jax.config.values["jax_compilation_cache_dir"]:
         return
     try:
         folder = cache_folder()

@@ -1,13 +1,14 @@
 """Evidence that a net rotation is right, measured without the equation that was solved for it.
 
-`net_rotation` solves `A omega = B theta_dot`. Here the motion is looked at from outside: the links' poses in the
-inertial frame, joint angles and base rotation together, are differentiated numerically along the path, and the
-angular momentum of the bodies and rotors that move like this is added up. It must vanish. No Jacobian, no
-`A`, no `B` and no angular velocity of the solver's enters, only poses, masses and inertias, so a mistake in
-any of those shows.
+`net_rotation` solves `A omega = B theta_dot`. Here the motion is looked at from outside: the links' poses
+in the inertial frame, joint angles and base rotation together, are differentiated numerically along the
+path, and the angular momentum of bodies and rotors that move like this is added up. It must vanish. No
+Jacobian, no `A`, no `B` and no angular velocity of the solver's enters, only poses, masses and inertias, so
+a mistake in any of those shows.
 """
 
 from fractions import Fraction
+from functools import partial
 from math import prod
 from typing import NamedTuple
 
@@ -30,36 +31,37 @@ WINDOW = 11
 
 
 class Certificate(NamedTuple):
-    """How well a net rotation is known. Levels are for float64, the named robots and edges of up to 270 degrees."""
+    """How well a net rotation is known. Levels are for float64, named robots, edges of 10 to 270 degrees."""
 
     momentum: Float[Array, ""]
-    """Largest angular momentum along the path, as `momentum_residual` has it; about 1e-11 (rounding in the differences)."""
+    """Largest angular momentum along the path, relative, as `momentum_residual` has it; about 1e-11.
+
+    It is the rounding of the differences: 1e-12 rad per edge, whatever the path's size."""
     orthogonality: Float[Array, ""]
-    """Largest entry of `R^T R - I` of the result; about 1e-15 (rounding)."""
+    """Largest entry of `R^T R - I` of the result; about 1e-14 (rounding)."""
     halving: Float[Array, ""]
-    """Angle between the results with `steps` and `2 * steps` steps per edge [rad]; below 1e-9 at the default."""
+    """Angle between the results with `steps` and `2 * steps` steps per edge [rad]."""
     endpoint: Float[Array, ""]
-    """Angle between the result and the end of the motion whose momentum was measured [rad]; below 1e-9 at the default."""
+    """Angle between the result and the end of the motion whose momentum was measured [rad]; as `halving`."""
 
 
-def certify(
-    robot: Robot, path: Path, *, steps: int = DEFAULT_STEPS, samples: int = DEFAULT_SAMPLES
-) -> Certificate:
+def certify(robot: Robot, path: Path, *, steps: int = DEFAULT_STEPS, samples: int = DEFAULT_SAMPLES) -> Certificate:
     """Measure how well `net_rotation(robot, path, steps=steps)` is known.
 
-    All four figures must be small. `momentum` says that the motion given by `rotation_history` is one of zero
-    angular momentum, `endpoint` that the result is where this motion ends, `halving` that the step is fine enough,
-    `orthogonality` that the result is a rotation.
+    All four figures must be small. `momentum` says that the motion given by `rotation_history` is one of
+    zero angular momentum, `endpoint` that the result is where this motion ends, `halving` that the step is
+    fine enough, `orthogonality` that the result is a rotation.
 
     Args:
         robot: the robot.
         path: the path in shape space.
         steps: steps per edge of the result, static.
-        samples: samples per edge for the momentum, static. The truncation of the differences falls with the tenth
-            power of the angle between samples; their rounding grows with `samples`.
+        samples: samples per edge for the momentum, static. The truncation of the differences falls with the
+            tenth power of the angle between samples; their rounding grows with `samples`.
 
     Raises:
-        ValueError: if the path's joints do not match the robot's, or a count is not an integer that is large enough.
+        ValueError: if the path's joints do not match the robot's, `steps` is not a positive integer, or
+            `samples` is not an integer of at least `WINDOW - 1`.
     """
     return certified_rotation(robot, path, steps=steps, samples=samples)[0]
 
@@ -67,17 +69,18 @@ def certify(
 def certified_rotation(
     robot: Robot, path: Path, *, steps: int = DEFAULT_STEPS, samples: int = DEFAULT_SAMPLES
 ) -> tuple[Certificate, Float[Array, "3 3"], Float[Array, "m 3 3"]]:
-    """Return the certificate, the net rotation and the history that it speaks of; all arguments as for `certify`."""
+    """Return the certificate with the net rotation and the history that it is about; see `certify`."""
+    history = rotation_history(robot, path, samples=samples)
+    momentum = momentum_residual(robot, path, history)
     points = jnp.asarray(path.waypoints)
     middles = 0.5 * (points[:-1] + points[1:])
     halved = jnp.concatenate([jnp.stack([points[:-1], middles], 1).reshape(-1, path.joints), points[-1:]])
     padded = jnp.concatenate([points, jnp.tile(points[-1:], (path.edges, 1))])
     both = jnp.stack([padded, halved])  # of one shape, so that one program is compiled and not two
     result, finer = jax.vmap(lambda waypoints: net_rotation(robot, Path(waypoints), steps=steps))(both)
-    history = rotation_history(robot, path, samples=samples)
     gap = jnp.matmul(result.T, result, precision="highest") - jnp.eye(3, dtype=result.dtype)
     certificate = Certificate(
-        momentum=momentum_residual(robot, path, history),
+        momentum=momentum,
         orthogonality=jnp.abs(gap).max(),
         halving=_distance(result, finer),
         endpoint=_distance(result, history[-1]),
@@ -93,36 +96,38 @@ def momentum_residual(robot: Robot, path: Path, rotations: Float[Array, "m 3 3"]
 
         max |h| / max s,    h = sum of l,  s = sum of |l|,    both maxima over all samples,
 
-    `l` being the momenta about the centre of mass of each link's turn, of its centre's motion, and of each rotor.
-    So 1 is as wrong as can be, and edges on which little moves count little. A path that stays put has 0.
+    `l` being the momenta about the centre of mass of each link's turn, of its centre's motion, and of each
+    rotor. So 1 is as wrong as can be, and edges on which little moves count little. A path that stays put
+    has 0.
 
     Args:
         robot: the robot.
         path: the path in shape space.
-        rotations: rotations of the base at equally spaced samples of every edge, laid out as `rotation_history`
-            does; from any source.
+        rotations: rotations of the base at equally spaced samples of every edge, laid out as
+            `rotation_history` does; from any source.
 
     Raises:
         ValueError: if `rotations` does not fit the path, or has too few samples per edge.
     """
-    edges, count = path.edges, jnp.shape(rotations)[0] - 1 if jnp.ndim(rotations) else -1
-    samples = count // edges if edges else 0
-    if jnp.shape(rotations) != (edges * samples + 1, 3, 3):
+    edges = path.edges
+    shape = jnp.shape(rotations)
+    samples = (shape[0] - 1) // edges if edges and shape else 0
+    if shape != (edges * samples + 1, 3, 3):
         raise ValueError(
-            f"`rotations` has shape {jnp.shape(rotations)}; for a path of {edges} edges it must be "
+            f"`rotations` has shape {shape}; for a path of {edges} edges it must be "
             f"(samples per edge * {edges} + 1, 3, 3)."
         )
     if edges and samples < WINDOW - 1:
-        raise ValueError(f"`rotations` has {samples} samples per edge; the momentum needs {WINDOW - 1} or more.")
+        raise ValueError(f"`rotations` has {samples} samples per edge; differences need {WINDOW - 1} or more.")
     return _residual(robot, path.waypoints, rotations, samples)
 
 
-@jax.jit(static_argnums=3)
+@partial(jax.jit, static_argnums=3)
 def _residual(robot: Robot, waypoints: Array, rotations: Array, samples: int) -> jax.Array:
     dtype = common_float(robot, waypoints, rotations)
-    if waypoints.shape[0] == 1:
-        return jnp.zeros((), dtype)
     robot, points, turned = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), (robot, waypoints, rotations))
+    if points.shape[0] == 1:
+        return jnp.zeros((), dtype)
     first = turned[:-1].reshape(-1, samples, 3, 3)
     along = jnp.concatenate([first, turned[samples::samples, None]], axis=1)
 
@@ -142,45 +147,44 @@ def edge_momentum(
 
     About the centre of mass [kg m^2/s]. The rotations are at `m` equally spaced samples, `m >= WINDOW`.
     """
-    samples = rotations.shape[0] - 1
-    fraction = jnp.arange(samples + 1, dtype=rotations.dtype)[:, None] / samples
-    rate = end - start
-    pose = jax.vmap(lambda theta: kinematics(robot, theta))(start[None] + rate[None] * fraction)
+    rate = jnp.asarray(end - start)
+    fraction = jnp.linspace(0, 1, rotations.shape[0], dtype=rotations.dtype)
+    pose = jax.vmap(lambda theta: kinematics(robot, theta))(start[None] + rate[None] * fraction[:, None])
     turn = _product("sab,sibc->siac", rotations, pose.rotation)
     place = _product("sab,sib->sia", rotations, pose.centre)
     axis = _product("sab,skb->ska", rotations, pose.axis)
-    body_rate = _product("siba,sibc->siac", turn, _derivative(turn))  # hat of the angular velocity, link's frame
-    omega = 0.5 * jnp.stack([body_rate[..., i, k] - body_rate[..., k, i] for i, k in ((2, 1), (0, 2), (1, 0))], -1)
+    spinning = _product("siba,sibc->siac", turn, _derivative(turn))  # hat of the angular velocity, link frame
+    omega = 0.5 * jnp.stack([spinning[..., i, k] - spinning[..., k, i] for i, k in ((2, 1), (0, 2), (1, 0))], -1)
     spin = _product("siab,ibc,sic->sia", turn, robot.inertia, omega)
     orbit = robot.mass[None, :, None] * jnp.cross(place, _derivative(place))
-    side = np.array([1.0 if side == "parent" else -1.0 for side in robot.rotor_on])
+    side = np.array([1 if side == "parent" else -1 for side in robot.rotor_on], rotations.dtype)
     rotor = (robot.rotor_inertia * robot.gear_ratio * side * rate)[None, :, None] * axis
     parts = jnp.concatenate([spin, orbit, rotor], axis=1)
     return parts.sum(1), jnp.sqrt((parts * parts).sum(-1)).sum(1)
 
 
-def _product(subscripts: str, *operands: jax.Array) -> jax.Array:
-    return jnp.einsum(subscripts, *operands, precision="highest")
+def _product(subscripts: str, *factors: Array) -> jax.Array:
+    return jnp.einsum(subscripts, *(jnp.asarray(factor) for factor in factors), precision="highest")
 
 
-def _distance(first: jax.Array, second: jax.Array) -> jax.Array:
+def _distance(first: Array, second: Array) -> Array:
     return so3.angle(jnp.matmul(first.T, second, precision="highest"))
 
 
 def _derivative(values: jax.Array) -> jax.Array:
-    """Derivative over the unit interval of equally spaced samples (axis 0, ends included); exactly 0 of a constant."""
+    """Derivative over the unit interval of equally spaced samples (axis 0, both ends); 0 of a constant."""
     samples = values.shape[0] - 1
     flat = (values - values[:1]).reshape(samples + 1, -1)
     weights = np.asarray(_WEIGHTS * samples, values.dtype)
-    half, shifts = WINDOW // 2, samples + 2 - WINDOW
-    middle = sum(weights[half, k] * flat[k : k + shifts] for k in range(WINDOW))
+    half, inner = WINDOW // 2, samples + 2 - WINDOW
+    middle = jnp.stack([weights[half, k] * flat[k : k + inner] for k in range(WINDOW)]).sum(0)
     head = jnp.matmul(weights[:half], flat[:WINDOW], precision="highest")
     tail = jnp.matmul(weights[half + 1 :], flat[-WINDOW:], precision="highest")
     return jnp.concatenate([head, middle, tail]).reshape(values.shape)
 
 
 def _difference_weights(width: int) -> np.ndarray:
-    """Row p: weights of the values at 0, 1, ..., width - 1 in the derivative at p of their polynomial (Lagrange)."""
+    """Row p: weights of values at 0, ..., width - 1 in the derivative at p of their polynomial (Lagrange)."""
     nodes = range(width)
     weights = np.zeros((width, width))
     for p in nodes:

@@ -5,10 +5,12 @@ from collections.abc import Sequence
 from pathlib import Path as FilePath
 
 import numpy as np
+from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MultipleLocator
 
+from reojax._arrays import Array
 from reojax._orientation import tilt_and_roll
 from reojax._output import check_writable, replacing
 from reojax.holonomy import rotation_history
@@ -18,6 +20,8 @@ from reojax.robot import Robot
 FORMATS = ("png", "pdf", "svg")
 """Kinds of picture, by the ending of the file's name."""
 
+_SAMPLES = 64
+"""Samples per edge."""
 _INK, _PALE = "#222222", "#d9d9d9"
 _ANGLES = (("tilt about x", "#009e73"), ("tilt about y", "#cc79a7"), ("roll about z", "#d55e00"))
 _JOINTS = ("#0072b2", "#e69f00", "#56b4e9", "#7f3c8d", "#80ba5a", "#666666")
@@ -32,20 +36,21 @@ def history_figure(
     *,
     title: str | None = None,
     edge_names: Sequence[str] | None = None,
-    samples: int = 64,
+    rotations: Float[Array, "m 3 3"] | None = None,
 ) -> Figure:
     """Draw how the base turns along a path, and what the joints do.
 
-    Above, tilt about x and y and roll about z of the base: `R = exp((tilt_x, tilt_y, 0)) Rz(roll)`, which are the ZXZ
-    angles (a, b, c) told without jumps; the tilt has length b and direction a, and the roll is a + c, counted on
-    beyond a half turn. Below, the joint angles. Every edge of the path has the same width, as there is no time in it.
+    Above, tilt about x and y and roll about z of the base: `R = exp((tilt_x, tilt_y, 0)) Rz(roll)`. These are
+    the ZXZ angles (a, b, c) told without jumps: the tilt has length b and direction a, and the roll is a + c,
+    counted on beyond a half turn. Below, the joint angles. Every edge of the path has the same width, as
+    there is no time in it.
 
     Args:
         robot: the robot.
         path: the path in shape space, of one edge or more.
         title: first line of the title; default the robot's name.
         edge_names: a name for each edge.
-        samples: samples per edge.
+        rotations: the `rotation_history` of the path, if it is known already.
 
     Raises:
         ValueError: if the path has no edge or does not fit the robot, or the names do not fit the path.
@@ -54,11 +59,12 @@ def history_figure(
         raise ValueError("`path` has one waypoint; a picture needs an edge.")
     if edge_names is not None and len(edge_names) != path.edges:
         raise ValueError(f"`edge_names` has {len(edge_names)} names; the path has {path.edges} edges.")
-    angles = np.rad2deg(tilt_and_roll(rotation_history(robot, path, samples=samples)))
+    history = rotation_history(robot, path, samples=_SAMPLES) if rotations is None else rotations
+    angles = np.rad2deg(tilt_and_roll(history))
     corners = np.rad2deg(np.asarray(path.waypoints, float))
     figure = Figure(figsize=(7.2, 6.4), layout="constrained", facecolor="white")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.15, 1))
-    along = np.arange(len(angles)) / samples
+    along = np.linspace(0, path.edges, len(angles))
     for (label, colour), values in zip(_ANGLES, angles.T, strict=True):
         above.plot(along, values, color=colour, label=label, linewidth=2)
     for k, label in enumerate(robot.joint_names):
@@ -117,8 +123,16 @@ def _dress(axes: Axes, edges: int) -> None:
     axes.spines[["left", "bottom"]].set_color("#888888")
     axes.tick_params(colors=_INK, length=3, color="#888888")
     axes.legend(
-        loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0.3, borderpad=0, ncols=6, columnspacing=1.6,
-        frameon=False, handlelength=2.2, fontsize=9.5, labelcolor=_INK,
+        loc="lower left",
+        bbox_to_anchor=(0, 1),
+        borderaxespad=0.3,
+        borderpad=0,
+        ncols=6,
+        columnspacing=1.6,
+        frameon=False,
+        handlelength=2.2,
+        fontsize=9.5,
+        labelcolor=_INK,
     )
 
 

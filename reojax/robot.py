@@ -7,7 +7,7 @@ Link 0 is the base (link 1 of the thesis). Joint `k` carries link `k + 1` and ha
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import jax
 import numpy as np
@@ -69,7 +69,7 @@ class Robot:
         """Number of joints, `j = n - 1`."""
         return len(self.parent)
 
-    def replace(self, **fields: Any) -> Self:
+    def replace(self, **fields: Any) -> "Robot":
         """Return a copy with some fields changed.
 
         Takes traced values, so that it can sit inside `vmap` and `grad`; only names and shapes are

@@ -30,7 +30,7 @@ def momentum(robot: Robot, theta: np.ndarray, theta_dot: np.ndarray, omega: np.n
 
     # From each centre of mass to the outboard joint (none on link n) and to the inboard one (none on link 1).
     r = [orientation[i] @ (robot.anchor[i] - robot.com[i]) for i in range(n - 1)] + [np.zeros(3)]
-    l = [np.zeros(3)] + [orientation[i] @ -robot.com[i] for i in range(1, n)]  # noqa: E741
+    l = [np.zeros(3)] + [orientation[i] @ -robot.com[i] for i in range(1, n)]
 
     # Thesis 1.5: mu_1 = 0, mu_i = sum of m_k / M over k < i, mu_(n+1) = 1.
     mu = [m[:i].sum() / M for i in range(n + 1)]

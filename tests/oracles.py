@@ -119,9 +119,7 @@ def mujoco_model(robot: Robot) -> Foreign:
         _weigh(body, *link)
     for rotor, disc in zip(rotors(robot), discs, strict=True):
         body = bodies[rotor.link].add_body(name=f"rotor{rotor.joint}")
-        body.add_joint(
-            name=f"rotor{rotor.joint}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=rotor.axis, pos=disc[1]
-        )
+        body.add_joint(name=f"rotor{rotor.joint}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=rotor.axis, pos=disc[1])
         _weigh(body, *disc)
     model = spec.compile()
     first = {k: int(model.joint(name).dofadr[0]) for k, name in enumerate(robot.joint_names)}
@@ -153,9 +151,7 @@ def _spread(arm: np.ndarray) -> np.ndarray:
     return arm @ arm * np.eye(3) - np.outer(arm, arm)
 
 
-def pinocchio_momentum(
-    foreign: Foreign, theta: np.ndarray, position: np.ndarray, rotation: np.ndarray
-) -> np.ndarray:
+def pinocchio_momentum(foreign: Foreign, theta: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """Momentum matrix by Pinocchio: (6, 6 + j), see `split`."""
     import pinocchio as pin
 
@@ -171,9 +167,7 @@ def _configuration(foreign: Foreign, base: list, theta: np.ndarray, neutral: np.
     return q
 
 
-def mujoco_momentum(
-    foreign: Foreign, theta: np.ndarray, position: np.ndarray, rotation: np.ndarray
-) -> np.ndarray:
+def mujoco_momentum(foreign: Foreign, theta: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """Angular momentum matrix by MuJoCo: (3, 6 + j), see `split`."""
     import mujoco
 

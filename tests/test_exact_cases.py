@@ -132,7 +132,7 @@ def test_two_wheels_round_a_circle():
 
 
 def rods(mass, length) -> reojax.Robot:
-    """Thin uniform rods on one line, joined end to end by hinges about z; the base frame is in rod 1's middle."""
+    """Thin uniform rods on one line, joined end to end by hinges about z; base frame in rod 1's middle."""
     mass, length = np.array(mass, float), np.array(length, float)
     thickness = 1e-3
     along, across = mass * thickness**2, mass * length**2 / 12

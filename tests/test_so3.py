@@ -266,7 +266,7 @@ def test_random_rotations_are_uniform():
     assert jax.eval_shape(lambda key: so3.random(key, jnp.float32), jax.random.key(0)).dtype == jnp.float32
 
 
-# --- arrays: dtype, shape, batching, what it compiles to ---------------------------------------------------
+# --- arrays: dtype, shape, batching, what it compiles to -------------------------------------------------
 
 
 def test_float32_is_right_to_its_own_rounding():

@@ -21,8 +21,7 @@ from reojax._fast.momentum import angular_momentum
 from reojax._fast.nodes import path_nodes, to_nodes
 from reojax._fast.omega import inward, solve
 from reojax._fast.product import Triple, ordered_products, rotate, times, to_matrix
-from reojax._fast.scalar import cross, plus
-from reojax._fast.scalar import times as scale
+from reojax._fast.scalar import cross, plus, times as scale
 from reojax._fast.sincos import sincos
 from reojax._fast.steps import Step, mean_over_step, step_rotations
 from reojax.robot import Robot

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import jax
 
-Scalar: TypeAlias = jax.Array | float
+Scalar: TypeAlias = jax.Array | float | int
 Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
 Symmetric: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
 """xx, yy, zz, xy, xz, yz."""

@@ -1,18 +1,17 @@
 """The command line, `reojax` or `python -m reojax`: one module per subcommand, listed in `COMMANDS`.
 
-A subcommand's module has a docstring, whose first line is its help, `add_arguments(parser)` and `run(args)`. It
-imports what computes inside `run`, so that help and mistyped arguments are answered at once. Results go to stdout;
-a picture or file is written before they are printed. Exit status: 0 done, 2 bad input (one line on stderr),
-130 interrupted.
+A subcommand's module has a docstring, whose first line is its help, `add_arguments(parser)` and `run(args)`.
+It imports what computes inside `run`, so that help and mistyped arguments are answered at once. Results go
+to stdout, after any file has been written. Exit status: 0 done, 2 bad input (one line on stderr), 130
+interrupted.
 """
 
 import os
 import sys
 from collections.abc import Sequence
-from importlib import metadata
 
 from reojax.cli import simulate
-from reojax.cli._arguments import BadInput, Parser, joined
+from reojax.cli._arguments import BadInput, Parser, joined, version
 
 COMMANDS = {"simulate": simulate}
 """Subcommands by name."""
@@ -34,14 +33,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of stdout has enough; Python flushes once more when it ends
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0
-
-
-def version() -> str:
-    """Version of the installed package."""
-    try:
-        return metadata.version("reojax")
-    except metadata.PackageNotFoundError:
-        return "(not installed)"
 
 
 def _parser() -> Parser:

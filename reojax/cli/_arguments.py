@@ -1,8 +1,9 @@
-"""What the subcommands share: the error for bad input, the parser, and the reading of angles."""
+"""What the subcommands share: the error for bad input, the parser, the reading of angles, the version."""
 
 import argparse
 import math
 from collections.abc import Sequence
+from importlib import metadata
 from typing import NoReturn
 
 LARGEST_ANGLE = 36000.0
@@ -35,7 +36,7 @@ def degrees(text: str) -> float:
 
 
 def joined(arguments: Sequence[str]) -> list[str]:
-    """Join each option to a negative number after it, all of which argparse would not know: `--bend=-1e2`."""
+    """Join options to negative numbers after them, of which argparse knows only some: `--bend=-1e2`."""
     result: list[str] = []
     for argument in arguments:
         if result and result[-1].startswith("--") and "=" not in result[-1] and _negative(argument):
@@ -43,6 +44,14 @@ def joined(arguments: Sequence[str]) -> list[str]:
         else:
             result.append(argument)
     return result
+
+
+def version() -> str:
+    """Version of the installed package."""
+    try:
+        return metadata.version("reojax")
+    except metadata.PackageNotFoundError:
+        return "(not installed)"
 
 
 def _negative(text: str) -> bool:

@@ -1,13 +1,10 @@
-"""Run a manoeuvre and report how far the robot turns, and how sure that is.
-
-The net rotation is that of the base, from its frame at the start. The certificate is `reojax.certificate`'s.
-"""
+"""Run a manoeuvre; print how far the robot turns, and how sure that is."""
 
 import argparse
 import json
 from typing import TYPE_CHECKING, Any
 
-from reojax.cli._arguments import BadInput, degrees
+from reojax.cli._arguments import BadInput, degrees, version
 
 if TYPE_CHECKING:
     from reojax.manoeuvres import Layout
@@ -15,18 +12,19 @@ if TYPE_CHECKING:
     from reojax.robot import Robot
 
 _RESOLVED = 270.0
-"""Largest change of a joint angle on an edge for which the default numbers of steps and samples are meant [deg]."""
+"""Largest change of a joint angle on an edge for which the default steps and samples are meant [deg]."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `reojax simulate`."""
     add = parser.add_argument
-    add("--manoeuvre", choices=("a", "b"), default="a", help="a: twist opposite ways; b: twist the same way [%(default)s]")
+    parts = "a: the distal joints twist opposite ways; b: the same way [%(default)s]"
+    add("--manoeuvre", choices=("a", "b"), default="a", help=parts)
     add("--twist", type=degrees, default=270.0, metavar="DEG", help="twist of the distal joints [%(default)g]")
     add("--bend", type=degrees, default=120.0, metavar="DEG", help="bend of the centre joint [%(default)g]")
-    add("--robot", default="prototype", metavar="NAME", help="robot by name; a wrong one lists them [%(default)s]")
+    add("--robot", default="prototype", metavar="NAME", help="robot; a wrong name lists them [%(default)s]")
     add("--json", action="store_true", help="print one JSON object, with all digits")
-    add("--out", metavar="FIGURE", help="write a picture of orientation and joint angles (.png, .pdf, .svg)")
+    add("--out", metavar="FIGURE", help="draw orientation and joint angles to a .png, .pdf or .svg")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -38,13 +36,10 @@ def run(args: argparse.Namespace) -> None:
         robot = robots.by_name(args.robot)
         path = _path(robot, args)
         if args.out is not None:
-            from reojax import plot
-
-            plot.check_picture(args.out)
-        report = _report(robot, path, args)
+            _check_picture(args.out)
+        report, history = _report(robot, path, args)
         if args.out is not None:
-            figure = plot.history_figure(robot, path, title=_heading(args), edge_names=_edge_names(robot))
-            plot.save(figure, args.out)
+            _draw(robot, path, history, args)
     except ValueError as error:
         raise BadInput(f"reojax simulate: {error}") from error
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(report, args))
@@ -71,24 +66,36 @@ def _path(robot: "Robot", args: argparse.Namespace) -> "Path":
     return manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), _layout(robot))
 
 
-def _edge_names(robot: "Robot") -> tuple[str, ...]:
-    loop = ("bend", "twist", "unbend", "untwist")
-    return loop if _layout(robot).fold is None else ("fold", *loop, "unfold")
-
-
 def _heading(args: argparse.Namespace) -> str:
-    return f"manoeuvre {args.manoeuvre.upper()} on {args.robot}: twist {args.twist:g} deg, bend {args.bend:g} deg"
+    angles = f"twist {args.twist:g} deg, bend {args.bend:g} deg"
+    return f"Manoeuvre {args.manoeuvre.upper()} on {args.robot}: {angles}"
 
 
-def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> dict[str, Any]:
-    """Everything that is printed, as plain numbers."""
+def _check_picture(out: str) -> None:
+    from reojax import plot
+
+    plot.check_picture(out)
+
+
+def _draw(robot: "Robot", path: "Path", history: Any, args: argparse.Namespace) -> None:
+    from reojax import plot
+
+    names = ("bend", "twist", "unbend", "untwist")
+    if _layout(robot).fold is not None:
+        names = ("fold", *names, "unfold")
+    title = _heading(args).replace(" deg", "°").replace(" -", " \u2212")
+    figure = plot.history_figure(robot, path, title=title, edge_names=names, rotations=history)
+    plot.save(figure, args.out)
+
+
+def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dict[str, Any], Any]:
+    """Everything that is printed, as plain numbers, and the history of rotations."""
     import jax
     import numpy as np
 
     from reojax import so3
     from reojax._orientation import tilt_and_roll
     from reojax.certificate import DEFAULT_SAMPLES, certified_rotation
-    from reojax.cli import version
     from reojax.holonomy import DEFAULT_STEPS
 
     longest = np.rad2deg(np.abs(np.diff(path.waypoints, axis=0)).max())
@@ -98,14 +105,14 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> dict[str,
     @jax.jit
     def compute(path: "Path") -> tuple[Any, ...]:  # one program to compile; the robot is constant in it
         certificate, rotation, history = certified_rotation(robot, path, steps=steps, samples=samples)
-        parts = (so3.log(rotation), so3.to_euler_zxz(rotation), so3.angle(rotation), so3.to_quaternion(rotation))
-        return certificate, rotation, history, parts
+        read = (so3.log, so3.to_euler_zxz, so3.angle, so3.to_quaternion)
+        return certificate, history, rotation, *(function(rotation) for function in read)
 
-    certificate, rotation, history, parts = jax.tree.map(np.asarray, compute(path))
+    certificate, history, rotation, *parts = jax.tree.map(np.asarray, compute(path))
     vector, euler, angle, quaternion = parts
     roll = tilt_and_roll(history)[-1, 2]
     beyond = (path.waypoints < robot.lower - 1e-9) | (path.waypoints > robot.upper + 1e-9)
-    return {
+    report = {
         "command": "simulate",
         "version": version(),
         "config": {
@@ -132,35 +139,46 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> dict[str,
             "halving_rad": float(certificate.halving),
             "endpoint_rad": float(certificate.endpoint),
         },
-        "joints_beyond_limits": [name for name, out in zip(robot.joint_names, beyond.any(0), strict=True) if out],
+        "joints_beyond_limits": [robot.joint_names[k] for k in np.flatnonzero(np.any(beyond, axis=0))],
         "picture": args.out,
     }
+    return report, history
 
 
 def _text(report: dict[str, Any], args: argparse.Namespace) -> str:
-    def row(label: str, names: str, values: list[float], unit: str) -> str:
-        cells = (f"{name:>3} {value:11.6f}" for name, value in zip(names.split(), values, strict=True))
-        return f"  {label:<18}{' '.join(cells)}  {unit}".rstrip()
-
-    check = report["certificate"]
     lines = [
         _heading(args),
         "",
-        "net rotation",
-        row("rotation vector", "x y z", report["rotation_vector_deg"], "deg"),
-        row("ZXZ angles", "z x' z\"", report["euler_zxz_deg"], "deg"),
-        row("quaternion", "w x y z", report["quaternion_wxyz"], ""),
-        row("angle", "-", [report["angle_deg"]], "deg"),
-        row("roll along path", "z", [report["roll_along_path_deg"]], "deg, counted beyond half turns"),
+        "net rotation of the base",
+        _row("rotation vector", ["x", "y", "z"], report["rotation_vector_deg"], "deg"),
+        _row("ZXZ angles", ["z", "x'", "z''"], report["euler_zxz_deg"], "deg"),
+        _row("quaternion", ["w", "x", "y", "z"], report["quaternion_wxyz"]),
+        _row("angle", [""], [report["angle_deg"]], "deg"),
+        _row("roll along path", ["z"], [report["roll_along_path_deg"]], "deg, half turns counted"),
         "",
         "certificate",
-        f"  momentum          {check['momentum_relative']:8.1e}      largest along the path, relative to what the links exchange",
-        f"  orthogonality     {check['orthogonality']:8.1e}      largest entry of R'R - 1",
-        f"  halving the step  {check['halving_rad']:8.1e} rad  change of the net rotation",
-        f"  endpoint          {check['endpoint_rad']:8.1e} rad  from the end of the motion whose momentum was measured",
     ]
+    figures = report["certificate"]
+    for label, key, unit, meaning in (
+        (
+            "momentum",
+            "momentum_relative",
+            "",
+            "largest along the path, as a share of what the links exchange",
+        ),
+        ("orthogonality", "orthogonality", "", "largest entry of R'R - 1"),
+        ("halving the step", "halving_rad", "rad", "change of the net rotation"),
+        ("endpoint", "endpoint_rad", "rad", "distance from where the measured motion ends"),
+    ):
+        lines.append(f"  {label:<19}{figures[key]:>9.1e} {unit:<5}{meaning}")
     if report["joints_beyond_limits"]:
         lines += ["", f"beyond the joint limits of {args.robot}: {', '.join(report['joints_beyond_limits'])}"]
     if report["picture"] is not None:
         lines += ["", f"picture in {report['picture']}"]
     return "\n".join(lines)
+
+
+def _row(label: str, names: list[str], values: list[float], unit: str = "") -> str:
+    rounded = (round(value, 6) + 0.0 for value in values)  # no -0
+    cells = (f"{name:<3}{value:>11.6f}" for name, value in zip(names, rounded, strict=True))
+    return f"  {label:<17}{'  '.join(cells)}  {unit}".rstrip()

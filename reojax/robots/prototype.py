@@ -1,8 +1,8 @@
 """The four-link robot of the thesis (chapter 2.6), and its three design parameters (figures 2.8 and 2.9).
 
-At `theta = 0` the robot is straight and the long axis is z:
+At `theta = 0` the robot is straight and its long axis is z:
 
-    z ^    link 0: end link, an L: shank along z and foot near -y      <- base, the thesis's link 1
+    z ^    link 0: end link, an L: shank along z, foot near +y       <- base, the thesis's link 1
       |    ---- joint 0, twist, about -z
       |    link 1: middle link
       |    ---- joint 1, bend, about +x
@@ -10,21 +10,26 @@ At `theta = 0` the robot is straight and the long axis is z:
       |    ---- joint 2, twist, about -z
            link 3: end link, a second copy of link 0 turned by half a turn about y
 
-Base frame: origin on joint 0. **Roll is about z** (the first angle of `so3.to_euler_zxz`), **yaw about y, pitch
-about x** (the bend axis). The twist axes point from the base outwards along the chain, which makes the roll of
-manoeuvre A have the sign of its twist: `manoeuvre_a(+270 deg, .)` rolls by a positive angle, as measured in the
-thesis (+3.35 rad), whichever way the centre bends. Positive bend folds the robot away from its feet; this is the
-bend of the fit below. Negative bend folds it towards them, and rolls more.
+Base frame: origin on joint 0. **Roll is about z, yaw about y, pitch about x** (the bend axis). In ZXZ angles roll is
+the first one; where the second one is zero, only the sum of first and third means anything, and that is the roll. The twist axes point from the base outwards along the chain. So the roll of manoeuvre A
+has the sign of its twist, whichever way the centre bends: `manoeuvre_a(+270 deg, .)` rolls by a positive angle, as
+the measured +3.35 rad. Positive bend folds the robot over its feet, as a cat folds over its paws; the fit is for
+this bend. Negative bend folds it the other way, and A then rolls less (130 degrees) and tips more (6).
 
-**Published** (thesis 2.6 and the grids of figures 2.8 and 2.9): total mass, end link inertia, rotor inertia, gear
-ratio, the motors of joints 0 and 2 inside links 1 and 2, and one motor for the centre joint, whose rotor is the
-one thing that tells the halves of an otherwise balanced robot apart. It is chosen to sit in link 1.
+**Published** (thesis 2.6, and the grids of figures 2.8 and 2.9): total mass, end link inertia, rotor inertia, gear
+ratio, steel in the ends of the end links, the motors of joints 0 and 2 inside links 1 and 2, and one motor for the
+centre joint. That motor is chosen to sit in link 1; its rotor is all that tells the two halves apart.
 
 **Chosen** is everything in `Chosen`, because the thesis keeps it in a CAD model: sizes, split of the mass, shape of
-the end links. Both end links are one part used twice, so the robot has the symmetry of a half turn about y. The foot
-leaves the bending plane (y-z) by `foot_angle`: as a mirror image of each other the two ends would make A a pure roll,
-however they are built, and the thesis sees off-axis rotation. `experiments/fit_prototype.py` fits length, radius and
-foot angle, and the values here are the fitted ones, rounded.
+the end links. Both end links are the same part, so but for the centre rotor the robot is symmetric under a half turn
+about y. The foot leaves the bending plane (y-z) by `foot_angle`. Ends that mirror each other would make A a pure roll,
+however they are built; this way it has an off-axis part, and the feet pass each other in A. (They meet in some of the
+others: `manoeuvre_b(-270 deg, 120 deg)` is one. Self-collision is not modelled.)
+
+**Fitted.** `experiments/fit_prototype.py` finds length and radius of the middle links and the foot angle from three
+aims: A at 270/120 degrees rolls by 185 degrees and tips the roll axis by 2, and the roll peaks at an end link inertia
+of 100 kg mm^2 (figure 2.8). The values here are the fitted ones, rounded. Mass split and shape of the L were picked
+by hand so that A grows smoothly with its amplitudes (figure 2.7) and B is strong enough to be of use.
 """
 
 from typing import Any, NamedTuple
@@ -55,23 +60,23 @@ BEND_LIMIT = np.deg2rad(120)
 class Chosen(NamedTuple):
     """What the thesis does not publish; every number here is chosen."""
 
-    middle_length: float = 0.0543
+    middle_length: float = 0.064
     """Length of a middle link, distal joint to centre joint [m]; fitted."""
-    middle_radius: float = 0.0235
+    middle_radius: float = 0.0256
     """Radius of a middle link, taken as a uniform cylinder [m]; fitted. It has to house a 17 mm motor."""
-    foot_angle: float = 0.244
+    foot_angle: float = 0.287
     """Angle by which the first foot leaves the bending plane, from +y towards -x [rad]; fitted."""
-    middle_mass: float = 0.105
+    middle_mass: float = 0.08
     """Mass of a middle link, motors included [kg]."""
-    shank_mass: float = 0.022
+    shank_mass: float = 0.058
     """Mass of the shank of an end link [kg]."""
-    foot_mass: float = 0.008
+    foot_mass: float = 0.005
     """Mass of the foot of an end link, without the steel insert, which has the rest of the total mass [kg]."""
-    shank_length: float = 0.035
+    shank_length: float = 0.05
     """Length of the shank, from the distal joint to the foot [m]."""
     rod_radius: float = 0.006
     """Radius of shank and foot [m]."""
-    insert_side: float = 0.012
+    insert_side: float = 0.01
     """Side of the steel insert, a cube at the far end of the foot [m]."""
 
     @property
@@ -96,15 +101,20 @@ def prototype(chosen: Chosen | None = None) -> Robot:
     """Build the thesis's prototype: four links, three joints, L-shaped end links (thesis 2.6).
 
     Frames, signs and sources are in this module's docstring. Manoeuvre A at 270/120 degrees rolls it by
-    185 degrees, unwrapped, and tips its roll axis by 3.
+    185 degrees (unwrapped: R itself shows -175) and tips its roll axis by 2; B yaws it by 45, the other way about y.
 
     Args:
         chosen: the unpublished numbers; default the fitted ones.
 
     Raises:
-        ValueError: if they make a link that no body can have.
+        ValueError: if they leave nothing of the total mass for the inserts, or make a link that no body can be.
     """
     chosen = Chosen() if chosen is None else chosen
+    if not chosen.insert_mass > 0:
+        raise ValueError(
+            f"the chosen parts leave {chosen.insert_mass:.6g} kg for each steel insert; it must be positive, so that "
+            f"the robot weighs {TOTAL_MASS} kg in all."
+        )
     middle = middle_link(chosen)
     first = _end_link(chosen)
     links = (first, middle, middle, half_turn_y(first))
@@ -128,9 +138,7 @@ def prototype(chosen: Chosen | None = None) -> Robot:
 def middle_link(chosen: Chosen) -> Solid:
     """Middle link, hanging along -z from its inboard joint at the origin."""
     length = chosen.middle_length
-    return cylinder(
-        chosen.middle_mass, chosen.middle_radius, length, centre=(0, 0, -length / 2), along=(0, 0, 1)
-    )
+    return cylinder(chosen.middle_mass, chosen.middle_radius, length, centre=(0, 0, -length / 2), along=(0, 0, 1))
 
 
 def shank(chosen: Chosen, *, start: float) -> Solid:

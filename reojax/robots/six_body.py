@@ -21,7 +21,7 @@ def six_body() -> Robot:
 
     At `theta = 0` all six links lie along z, the base (first foot) on top. Axes as on the prototype: roll about z,
     yaw about y, pitch about x. Joints 1 and 3 twist about -z, joint 2 bends about +x. Joints 0 and 4 fold the feet
-    about axes near -x and +x; at the angles (pi/2, -pi/2) of `SIX_BODY` each foot stands on its shank exactly as on
+    about axes near +x and -x; at the angles (pi/2, -pi/2) of `SIX_BODY` each foot stands on its shank exactly as on
     the prototype, and the robot is then the same mechanism, seen from the first foot. Base frame: origin on joint 0.
 
     Sources: the numbers of `prototype()`, parts and masses included. Chosen: folding joints with the prototype's motor

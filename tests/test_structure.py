@@ -1,0 +1,77 @@
+"""Imports point one way, the package's import stays light, and it changes no global setting."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parent.parent / "reojax"
+
+LAYERS = [
+    ["_arrays", "_smallmat", "_robot_checks", "_output", "_session"],
+    ["so3", "robot", "path"],
+    ["momentum", "manoeuvres"],
+    ["_fast.scalar", "_fast.sincos", "_fast.nodes"],
+    ["_fast.components", "_fast.product"],
+    ["_fast.omega", "_fast.steps"],
+    ["_fast.momentum"],
+    ["_fast.endpoint"],
+    ["holonomy"],
+    ["robots._solids"],
+    ["robots.prototype", "robots.planar", "robots.two_cylinder_cat"],
+    ["robots.six_body"],
+    ["robots"],
+    ["certificate"],
+    ["plot"],
+    ["cli.simulate"],
+    ["cli"],
+    ["__init__", "__main__"],
+]
+RANK = {module: rank for rank, layer in enumerate(LAYERS) for module in layer}
+
+
+def _name(file: Path) -> str:
+    parts = file.relative_to(PACKAGE).with_suffix("").parts
+    return ".".join(parts[:-1]) if parts[-1] == "__init__" and len(parts) > 1 else ".".join(parts)
+
+
+MODULES = {_name(file): file for file in PACKAGE.rglob("*.py") if file.read_text().count("import ")}
+
+
+def _imports(file: Path) -> set[str]:
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("reojax"):
+            inside = node.module.removeprefix("reojax").lstrip(".")
+            submodules = {f"{inside}.{a.name}".lstrip(".") for a in node.names}
+            found |= (submodules & RANK.keys()) or {inside or "__init__"}
+    return found
+
+
+@pytest.mark.parametrize("module", sorted(MODULES))
+def test_a_module_imports_only_what_stands_before_it(module):
+    """Each module has a place in the order, and reads only from lower ones."""
+    assert module in RANK, f"give {module} a place in LAYERS"
+    assert not {name for name in _imports(MODULES[module]) if RANK[name] >= RANK[module]}
+
+
+def test_only_the_plots_import_matplotlib():
+    """A picture is drawn in one file."""
+    using = {name for name, file in MODULES.items() if "matplotlib" in file.read_text()}
+    assert using <= {"plot"}
+
+
+def test_import_is_light_and_changes_nothing():
+    """No matplotlib, no optax, no JAX backend, no x64 after `import reojax`."""
+    code = """
+import sys, jax
+before = dict(jax.config.values)
+import reojax
+assert dict(jax.config.values) == before
+assert not {"matplotlib", "optax", "scipy.optimize"} & set(sys.modules)
+from jax._src import xla_bridge
+assert not xla_bridge.backends_are_initialized()
+"""
+    subprocess.run([sys.executable, "-W", "error", "-c", code], check=True)
