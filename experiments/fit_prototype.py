@@ -1,6 +1,6 @@
 """Which numbers, of those the thesis keeps to itself, make the four-link robot do what it reports?
 
-    python experiments/fit_prototype.py --out out          # 6 s on 2 cores; --quick: 4 s
+    python experiments/fit_prototype.py --out out          # some 8 s on 2 cores; --quick: fewer points
 
 Three of the chosen numbers of `reojax.robots.prototype` are fitted to three statements of the thesis: manoeuvre A at
 270/120 degrees rolls the robot by 174 to 192 degrees (aim: 185), with a small off-axis part (aim: 2 degrees), and a
@@ -10,20 +10,21 @@ design by hand. All that is published is then checked on the rounded numbers whi
 Expected: middle links 64 mm long and 25.6 mm in radius, feet 0.287 rad out of the bending plane; every check holds.
 """
 
-import argparse
-import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from _script import options, run
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 import reojax
 from reojax import robots, so3
+from reojax._output import check_writable, write_json
 from reojax.momentum import kinematics
 from reojax.robots.prototype import END_INERTIA, GEAR_RATIO, ROTOR_INERTIA, TOTAL_MASS, Chosen
 
@@ -49,7 +50,14 @@ class Turn(NamedTuple):
     """(m, 3) rotation vector, pitch, yaw, roll [deg]; roll between -180 and 180 here."""
 
 
-def turn(robot: reojax.Robot, paths: Sequence, *, inertia=END_INERTIA, ratio=GEAR_RATIO, rotor=ROTOR_INERTIA) -> Turn:
+def turn(
+    robot: reojax.Robot,
+    paths: Sequence[reojax.Path],
+    *,
+    inertia: ArrayLike = END_INERTIA,
+    ratio: ArrayLike = GEAR_RATIO,
+    rotor: ArrayLike = ROTOR_INERTIA,
+) -> Turn:
     """Turn of the prototype after each path, with the given end inertia, gear ratio and rotor inertia."""
     columns = [np.broadcast_to(np.asarray(x, float), (len(paths),)) for x in (inertia, ratio, rotor)]
     columns.append(np.stack([path.waypoints for path in paths]))
@@ -71,7 +79,7 @@ def _turn(robot, inertia, ratio, rotor, waypoints):
 _turns = jax.jit(jax.vmap(_turn, in_axes=(None, 0, 0, 0, 0)))
 
 
-def loops(manoeuvre, twists=TWISTS, bends=BENDS) -> list:
+def loops(manoeuvre: Any, twists: Any = TWISTS, bends: Any = BENDS) -> list[reojax.Path]:
     """Paths over the grid of amplitudes [deg], twist by twist."""
     return [manoeuvre(np.deg2rad(twist), np.deg2rad(bend)) for twist in twists for bend in bends]
 
@@ -118,7 +126,7 @@ def _poses(robot, shapes):
     return jax.vmap(lambda theta: kinematics(robot, theta)[:2])(shapes)
 
 
-def checks(robot: reojax.Robot, swept: dict[str, Turn], inertias: np.ndarray) -> list[tuple[str, str, str, bool]]:
+def checks(robot: reojax.Robot, swept: dict[str, Turn], inertias: np.ndarray) -> list[tuple[str, str, str, Any]]:
     """Every published constraint: its text, what is asked, what the robot does, and whether it holds."""
     a, b, ends = swept["a"], swept["b"], swept["inertia"]
     roll, motor = a.roll.reshape(5, 5), swept["motor"].roll.reshape(5, 5)
@@ -156,7 +164,7 @@ def checks(robot: reojax.Robot, swept: dict[str, Turn], inertias: np.ndarray) ->
 
 def main(out: Path, *, quick: bool = False) -> dict:
     """Fit, check, write `fit_prototype.json` and `fit_prototype.png` to `out`, and return the numbers."""
-    jax.config.update("jax_enable_x64", True)
+    table, picture = check_writable(out / "fit_prototype.json"), check_writable(out / "fit_prototype.png")
     scale = np.abs(GUESS)
     fit = least_squares(residuals, GUESS, x_scale=scale, diff_step=1e-5, xtol=1e-4 if quick else 1e-10)
     held, chosen = robots.prototype(), Chosen()
@@ -180,14 +188,13 @@ def main(out: Path, *, quick: bool = False) -> dict:
         "checks": [
             {"what": text, "asked": asked, "robot": value, "holds": bool(holds)} for text, asked, value, holds in rows
         ],
-        "all_hold": bool(all(row[3] for row in rows)),
+        "converged": bool(fit.success and all(row[3] for row in rows)),
         "end_inertia_kg_m2": inertias.tolist(),
         "sweeps_deg": {key: {"roll": t.roll.tolist(), "tilt": t.tilt.tolist()} for key, t in swept.items()},
         "b_yaw_deg": swept["b"].vector[:, 1].tolist(),
     }
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "fit_prototype.json").write_text(json.dumps(result, indent=1) + "\n")
-    draw(swept, inertias).savefig(out / "fit_prototype.png", dpi=130)
+    write_json(table, result)
+    draw(swept, inertias).savefig(picture, dpi=130)
     return result
 
 
@@ -244,8 +251,4 @@ def draw(swept: dict[str, Turn], inertias: np.ndarray) -> Figure:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--quick", action="store_true", help="fewer points")
-    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the results")
-    arguments = parser.parse_args()
-    main(arguments.out, quick=arguments.quick)
+    run(main, options(__doc__))

@@ -45,7 +45,7 @@ def test_simulate_prints_what_the_library_computes(capsys, tmp_path):
     assert report["roll_along_path_deg"] - 360 == pytest.approx(report["rotation_vector_deg"][2], abs=2)
     assert report["certificate"]["momentum_relative"] < 3e-11
     assert report["certificate"]["orthogonality"] < 3e-14
-    assert report["certificate"]["halving_rad"] < 1e-8
+    assert report["certificate"]["halving_rad"] < 1e-9
     assert report["joints_beyond_limits"] == []
     assert report["picture"] == str(out)
     assert os.listdir(tmp_path) == ["a.png"]

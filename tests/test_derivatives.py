@@ -12,7 +12,7 @@ from reojax import FOUR_BODY, make_robot, manoeuvre_a, manoeuvre_b, net_rotation
 
 LIMITS = (-3.0, 2.0)
 SERIAL = random_robot(1, 2, limits=LIMITS)
-TREE = random_robot(3, 2, branched=True, limits=LIMITS)
+TREE = random_robot(9, 2, branched=True, limits=LIMITS)
 ROBOTS = pytest.mark.parametrize("robot", [SERIAL, TREE], ids=["serial", "tree"])
 OPEN = np.random.default_rng(0).uniform(-2, 2, (4, 2))
 PATHS = {"open": OPEN, "loop": OPEN[[0, 1, 2, 0]], "zero": np.zeros((4, 2)), "still": OPEN[[3, 3, 3, 3]]}
@@ -34,8 +34,7 @@ def outcome(robot, waypoints):
     return jnp.append(reojax.so3.log(rotation), reojax.so3.angle(rotation))
 
 
-evaluate = jax.jit(outcome)
-push = jax.jit(lambda robot, waypoints, *by: jax.jvp(outcome, (robot, waypoints), by)[1])
+push = jax.jit(lambda robot, waypoints, *by: jax.jvp(outcome, (robot, waypoints), by))
 pull = jax.jit(lambda robot, waypoints, weight: jax.vjp(outcome, robot, waypoints)[1](weight))
 
 
@@ -54,15 +53,16 @@ def derivatives(robot, waypoints):
     numbers, build = ravel_pytree((robot, waypoints))
     largest = jax.tree.map(lambda leaf: np.full(leaf.shape, np.abs(leaf).max() or 1.0), (robot, waypoints))
     units = np.diag(ravel_pytree(largest)[0])
-    value = np.asarray(evaluate(robot, waypoints))
+    still = build(np.zeros(len(numbers)))
+    value = np.asarray(push(robot, waypoints, *still)[0])
 
     def near(unit, shift):
-        end = np.array(evaluate(*build(numbers + shift * unit)))
+        end = np.array(push(*build(numbers + shift * unit), *still)[0])
         if end[:3] @ value[:3] < 0 and end[3] > 3:
             end[:3] *= 1 - 2 * np.pi / end[3]
         return end
 
-    forward = [push(robot, waypoints, *build(unit)) for unit in units]
+    forward = [push(robot, waypoints, *build(unit))[1] for unit in units]
     reverse = [units @ ravel_pytree(pull(robot, waypoints, weight))[0] for weight in np.eye(4)]
     difference = [central(lambda shift, unit=unit: near(unit, shift)) for unit in units]
     return value, np.stack(forward, axis=1), np.stack(reverse), np.stack(difference, axis=1), build

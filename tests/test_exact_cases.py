@@ -11,8 +11,8 @@ import reojax
 
 TOLERANCE = 1e-9
 """[rad]"""
-WHOLE_TURN = 10
-"""Steps for an edge on which joints make a whole turn; the default is for shorter edges."""
+STEPS = 10
+"""Enough for an edge on which joints make a whole turn; the default is for shorter edges."""
 
 net_rotation = jax.jit(reojax.net_rotation, static_argnames="steps")
 X, Y, Z = np.eye(3)
@@ -29,8 +29,11 @@ def distance(rotation, exact) -> float:
     return np.linalg.norm(np.asarray(rotation) - exact) / np.sqrt(2)
 
 
-def along(robot, *waypoints, **options) -> np.ndarray:
-    return np.asarray(net_rotation(robot, reojax.polygon(np.array(waypoints, float)), **options))
+def along(robot, *waypoints, edges: int = 4) -> np.ndarray:
+    """Net rotation; the last corner is repeated so that most cases share one compiled program."""
+    waypoints = np.array(waypoints, float)
+    still = np.repeat(waypoints[-1:], edges + 1 - len(waypoints), axis=0)
+    return np.asarray(net_rotation(robot, reojax.polygon(np.concatenate([waypoints, still])), steps=STEPS))
 
 
 # --- 1. one body and a wheel -----------------------------------------------------------------------------
@@ -116,9 +119,9 @@ def test_two_wheels_round_a_circle():
     robot, k = body_with_two_wheels(), 0.5
 
     def polygon(edges: int) -> np.ndarray:
-        t = np.minimum(np.arange(2001) / edges, 1)[:, None] * 2 * np.pi  # the last corner repeated
+        t = np.linspace(0, 2 * np.pi, edges + 1)[:, None]
         corners = k * np.hstack([np.cos(t), np.sin(t)]) / PER_RADIAN
-        return Rotation.from_matrix(along(robot, *corners)).as_rotvec()
+        return Rotation.from_matrix(along(robot, *corners, edges=2000)).as_rotvec()
 
     coarse, middle, fine = map(polygon, (500, 1000, 2000))
     better = [(4 * middle - coarse) / 3, (4 * fine - middle) / 3]
@@ -151,7 +154,7 @@ def rods(mass, length) -> reojax.Robot:
 @pytest.mark.parametrize(("degrees", "exact"), [(90, -20.44674731982584), (360, -44.21942835455569)])
 def test_two_unequal_rods(degrees, exact):
     robot = rods([2.0, 1.0], [1.0, 0.5])
-    rotation = along(robot, [0], [np.deg2rad(degrees)], steps=WHOLE_TURN)
+    rotation = along(robot, [0], [np.deg2rad(degrees)])
     assert distance(rotation, turn(Z * np.deg2rad(exact))) < TOLERANCE
 
 
@@ -213,7 +216,7 @@ def test_the_cat_s_number():
 def test_bent_cat_twists_once_round(bend, j):
     """It turns about the line through the two cylinders' centres."""
     bend = np.deg2rad(bend)
-    rotation = along(two_cylinders(j), [0, bend, 0], [2 * np.pi, bend, -2 * np.pi], steps=WHOLE_TURN)
+    rotation = along(two_cylinders(j), [0, bend, 0], [2 * np.pi, bend, -2 * np.pi])
     chord = X + turn(Y * bend) @ X
     exact = turn(kane_and_scher(bend, j) * chord / np.linalg.norm(chord))
     assert distance(rotation, exact) < TOLERANCE
@@ -223,5 +226,5 @@ def test_bent_cat_twists_once_round(bend, j):
 def test_cat_in_manoeuvre_a(bend, j):
     """Manoeuvre A with a whole twist is the cat's turn about roll; bending and untwisting add nothing."""
     bend = np.deg2rad(bend)
-    rotation = net_rotation(two_cylinders(j), reojax.manoeuvre_a(2 * np.pi, bend), steps=WHOLE_TURN)
+    rotation = along(two_cylinders(j), *reojax.manoeuvre_a(2 * np.pi, bend).waypoints)
     assert distance(rotation, turn(kane_and_scher(bend, j) * X)) < TOLERANCE

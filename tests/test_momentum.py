@@ -1,5 +1,7 @@
 """The momentum matrices against Pinocchio, MuJoCo, the thesis's own equations and plain differences."""
 
+import functools
+
 import barycentric
 import jax
 import jax.numpy as jnp
@@ -23,8 +25,17 @@ def relative(value, exact) -> float:
     return np.abs(np.asarray(value) - exact).max() / np.abs(exact).max()
 
 
-def random_shapes(seed: int, joints: int, count: int = 3) -> np.ndarray:
+def random_shapes(seed: int, joints: int, count: int = 1) -> np.ndarray:
     return np.random.default_rng([99, seed]).uniform(-np.pi, np.pi, (count, joints))
+
+
+@functools.cache
+def evaluated(joints: int, branched: bool) -> list:
+    """Random robots with random shapes and reojax's matrices."""
+    robots = [random_robot(seed, joints, branched=branched) for seed in SEEDS]
+    shapes = [random_shapes(seed, joints, 2) for seed in SEEDS]
+    cases = [(robot, theta) for robot, pair in zip(robots, shapes, strict=True) for theta in pair]
+    return [(*case, *map(np.asarray, reojax.momentum_matrices(*case))) for case in cases]
 
 
 # --- other people's code ---------------------------------------------------------------------------------
@@ -38,30 +49,23 @@ def test_matrices_are_those_of(library, joints, branched):
     pytest.importorskip(library)
     build = getattr(oracles, f"{library}_model")
     momentum = getattr(oracles, f"{library}_momentum")
-    for seed in SEEDS:
-        robot = random_robot(seed, joints, branched=branched)
-        foreign = build(robot)
-        rng = np.random.default_rng(seed)
-        for theta in random_shapes(seed, joints):
-            rotation = Rotation.random(rng=rng).as_matrix()
-            exact = momentum(foreign, theta, rng.normal(size=3), rotation)
-            exact_A, exact_B, linear = oracles.split(exact, rotation)
-            A, B = reojax.momentum_matrices(robot, theta)
-            assert relative(A, exact_A) < 1e-12
-            assert relative(B, exact_B) < 1e-12
-            assert np.abs(linear).max() < 1e-12 * robot.mass.sum()
+    rng = np.random.default_rng(joints)
+    for robot, theta, A, B in evaluated(joints, branched):
+        rotation = Rotation.random(rng=rng).as_matrix()
+        exact = momentum(build(robot), theta, rng.normal(size=3), rotation)
+        exact_A, exact_B, linear = oracles.split(exact, rotation)
+        assert relative(A, exact_A) < 1e-12
+        assert relative(B, exact_B) < 1e-12
+        assert np.abs(linear).max() < 1e-12 * robot.mass.sum()
 
 
 @pytest.mark.parametrize("joints", range(1, 9))
 def test_matrices_are_the_thesis_s(joints):
     """Barycentric vectors (thesis 1.5, 2.5) give the same matrices for serial robots, rotors included."""
-    for seed in SEEDS:
-        robot = random_robot(seed, joints)
-        for theta in random_shapes(seed, joints):
-            A, B = reojax.momentum_matrices(robot, theta)
-            exact_A, exact_B = barycentric.momentum_matrices(robot, theta)
-            assert relative(A, exact_A) < 1e-12
-            assert relative(B, exact_B) < 1e-12
+    for robot, theta, A, B in evaluated(joints, False):
+        exact_A, exact_B = barycentric.momentum_matrices(robot, theta)
+        assert relative(A, exact_A) < 1e-12
+        assert relative(B, exact_B) < 1e-12
 
 
 def test_rotors_are_seen_by_the_oracles():

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 import reojax
 from reojax import robots, so3
@@ -36,7 +37,12 @@ def _turns(inertia, ratio, rotor, waypoints):
     return *roll_and_tilt(history), so3.log(history[-1])
 
 
-def turns(inertia=70 * MM2, ratio=24.0, rotor=0.1 * MM2, waypoints=FULL):
+def turns(
+    inertia: ArrayLike = 70 * MM2,
+    ratio: ArrayLike = 24.0,
+    rotor: ArrayLike = 0.1 * MM2,
+    waypoints: ArrayLike = FULL,
+) -> list[np.ndarray]:
     """Roll, tilt and rotation vector [deg] of the prototype, for columns of designs or paths."""
     shapes = [np.shape(inertia), np.shape(ratio), np.shape(rotor), np.shape(waypoints)[:-2]]
     (count,) = np.broadcast_shapes(*shapes, (1,))
@@ -219,8 +225,7 @@ def test_changes_keep_other_leaves_and_dtypes(change, value, fields):
 
 
 def test_changes_have_right_derivatives():
-    nominal = jnp.array([70 * MM2, 24.0, 0.1 * MM2])
-    size = jnp.asarray(nominal)
+    size = jnp.array([70 * MM2, 24.0, 0.1 * MM2])
 
     @jax.jit
     def momenta(scale):
@@ -230,9 +235,7 @@ def test_changes_have_right_derivatives():
         return 1e6 * jnp.concatenate([A, B], axis=1)
 
     one, step = jnp.ones(3), 1e-4
-    exact = jax.jit(jax.jacfwd(momenta))(one)
-    reverse = jax.jit(jax.jacrev(momenta))(one)
-    np.testing.assert_allclose(reverse, exact, atol=1e-9)
+    exact = jax.jit(jax.jacrev(momenta))(one)
     for k in range(3):
         move = step * jnp.eye(3)[k]
         numeric = (momenta(one + move) - momenta(one - move)) / (2 * step)
@@ -249,10 +252,10 @@ def test_one_value_a_joint():
 @pytest.mark.parametrize(
     ("change", "value", "message"),
     [
-        (robots.with_end_inertia, 0.0, "`inertia` is 0.0; it must be one positive number"),
+        (robots.with_end_inertia, 0.0, "`inertia` is 0.0; it must be one positive, finite number"),
         (robots.with_end_inertia, np.nan, "`inertia` is nan"),
         (robots.with_end_inertia, np.inf, "`inertia` is inf"),
-        (robots.with_end_inertia, [1e-6, 2e-6], "must be one positive number"),
+        (robots.with_end_inertia, [1e-6, 2e-6], "must be one positive, finite number"),
         (robots.with_gear_ratio, np.inf, "`ratio` is inf; it must be finite"),
         (robots.with_gear_ratio, [1.0, 2.0], r"`ratio` has shape \(2,\)"),
         (robots.with_rotor_inertia, -1e-7, "`inertia` is -1e-07; it must be finite and not negative"),
@@ -275,7 +278,7 @@ def test_folded_feet_make_the_prototype():
     """Same masses in the same places, seen from the shank."""
     robot = robots.six_body()
     theta = np.zeros(5)
-    theta[list(reojax.SIX_BODY.fold)] = reojax.SIX_BODY.fold_angle
+    theta[[0, 4]] = reojax.SIX_BODY.fold_angle
     theta[[1, 2, 3]] = shape = np.array([0.4, 1.1, -2.0])
     six, four = jax.jit(kinematics)(robot, theta), jax.jit(kinematics)(PROTOTYPE, shape)
     assert robot.mass[:2].sum() == pytest.approx(PROTOTYPE.mass[0], rel=1e-12)
@@ -295,18 +298,15 @@ def test_folded_feet_make_the_prototype():
         )
 
 
-@pytest.mark.parametrize("manoeuvre", [reojax.manoeuvre_a, reojax.manoeuvre_b])
-def test_six_links_turn_as_far_as_four(manoeuvre):
-    six = net_rotation(robots.six_body(), manoeuvre(TWIST, BEND, reojax.SIX_BODY))
+@pytest.mark.parametrize(("manoeuvre", "least", "most"), [(reojax.manoeuvre_a, 174, 192), (reojax.manoeuvre_b, -5, 5)])
+def test_six_links_turn_as_far_as_four(manoeuvre, least, most):
+    """The same loop, seen from the folded foot, between folding and unfolding: a conjugate rotation."""
+    history = reojax.rotation_history(robots.six_body(), manoeuvre(TWIST, BEND, reojax.SIX_BODY), samples=8)
     four = net_rotation(PROTOTYPE, manoeuvre(TWIST, BEND))
-    assert so3.angle(six) == pytest.approx(so3.angle(four), abs=1e-9)
-
-
-def test_six_links_roll():
-    path = reojax.manoeuvre_a(TWIST, BEND, reojax.SIX_BODY)
-    roll, tilt = roll_and_tilt(reojax.rotation_history(robots.six_body(), path, samples=8))
-    assert 174 < np.rad2deg(roll) < 192
-    assert np.rad2deg(tilt) < 5
+    assert float(so3.angle(history[-1])) == pytest.approx(float(so3.angle(four)), abs=1e-9)
+    roll, tilt = np.rad2deg(roll_and_tilt(history))
+    assert least < roll < most
+    assert tilt < (8 if manoeuvre is reojax.manoeuvre_a else 90)
 
 
 # --- planar rods -----------------------------------------------------------------------------------------
@@ -358,8 +358,12 @@ def kane_and_scher(ratio, bend):
     return 2 * np.pi * ratio * np.cos(bend / 2) / (np.sin(bend / 2) ** 2 + ratio * np.cos(bend / 2) ** 2)
 
 
+def turned_cat(ratio, path):
+    return reojax.net_rotation(robots.two_cylinder_cat(ratio), path, steps=20)  # full turns of flat discs too
+
+
 def test_the_cat_turns_half_a_turn():
-    rotation = net_rotation(robots.two_cylinder_cat(0.25), reojax.manoeuvre_a(-2 * np.pi, np.deg2rad(60)))
+    rotation = turned_cat(0.25, reojax.manoeuvre_a(-2 * np.pi, np.deg2rad(60)))
     x, y, z = np.rad2deg(so3.log(rotation))
     assert z == pytest.approx(178.15379734994, abs=1e-7)
     assert max(abs(x), abs(y)) < 1e-7
@@ -369,7 +373,7 @@ def test_the_cat_turns_half_a_turn():
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_cat_meets_the_formula(ratio, bend, sign):
     bend = np.deg2rad(bend)
-    rotation = net_rotation(robots.two_cylinder_cat(ratio), reojax.manoeuvre_a(-sign * 2 * np.pi, bend))
+    rotation = turned_cat(ratio, reojax.manoeuvre_a(-sign * 2 * np.pi, bend))
     exact = so3.exp(np.array([0, 0, sign * kane_and_scher(ratio, bend)]))
     np.testing.assert_allclose(rotation, exact, atol=1e-9)
 

@@ -10,8 +10,8 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "reojax"
 
 LAYERS = [
-    ["_arrays", "_smallmat", "_robot_checks", "_output", "_session"],
-    ["so3", "robot", "path"],
+    ["_arrays", "_robot_checks", "_output", "_session"],
+    ["_smallmat", "_orientation", "so3", "robot", "path"],
     ["momentum", "manoeuvres"],
     ["_fast.scalar", "_fast.sincos", "_fast.nodes"],
     ["_fast.components", "_fast.product"],
@@ -25,6 +25,7 @@ LAYERS = [
     ["robots"],
     ["certificate"],
     ["plot"],
+    ["cli._arguments"],
     ["cli.simulate"],
     ["cli"],
     ["__init__", "__main__"],

@@ -180,5 +180,5 @@ def _text(report: dict[str, Any], args: argparse.Namespace) -> str:
 
 def _row(label: str, names: list[str], values: list[float], unit: str = "") -> str:
     rounded = (round(value, 6) + 0.0 for value in values)  # no -0
-    cells = (f"{name:<3}{value:>11.6f}" for name, value in zip(names, rounded, strict=True))
+    cells = (f"{name:<4}{value:>11.6f}" for name, value in zip(names, rounded, strict=True))
     return f"  {label:<17}{'  '.join(cells)}  {unit}".rstrip()

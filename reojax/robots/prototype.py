@@ -11,10 +11,12 @@ At `theta = 0` the robot is straight and its long axis is z:
            link 3: end link, a second copy of link 0 turned by half a turn about y
 
 Base frame: origin on joint 0. **Roll is about z, yaw about y, pitch about x** (the bend axis). In ZXZ angles roll is
-the first one; where the second one is zero, only the sum of first and third means anything, and that is the roll. The twist axes point from the base outwards along the chain. So the roll of manoeuvre A
-has the sign of its twist, whichever way the centre bends: `manoeuvre_a(+270 deg, .)` rolls by a positive angle, as
-the measured +3.35 rad. Positive bend folds the robot over its feet, as a cat folds over its paws; the fit is for
-this bend. Negative bend folds it the other way, and A then rolls less (130 degrees) and tips more (6).
+the first one; where the second one is zero, only the sum of first and third means anything, and that is the roll.
+
+The twist axes point from the base outwards along the chain. So the roll of manoeuvre A has the sign of its twist,
+whichever way the centre bends: `manoeuvre_a(+270 deg, .)` rolls by a positive angle, as the measured +3.35 rad.
+Positive bend folds the robot over its feet, as a cat folds over its paws; the fit is for this bend. Negative bend folds
+it the other way, and A then rolls less (130 degrees) and tips more (6).
 
 **Published** (thesis 2.6, and the grids of figures 2.8 and 2.9): total mass, end link inertia, rotor inertia, gear
 ratio, steel in the ends of the end links, the motors of joints 0 and 2 inside links 1 and 2, and one motor for the
@@ -175,14 +177,14 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
         inertia: inertia of either end link about its distal joint's axis [kg m^2]; may be traced.
 
     Raises:
-        ValueError: if the robot has not four links, or `inertia` is not one positive number.
+        ValueError: if the robot has not four links, or `inertia` is not one positive, finite number.
     """
     if robot.links != 4:
         raise ValueError(f"{robot.name!r} has {robot.links} links; end links are defined for the four-link robot.")
     xp, cast = _like(robot, inertia)
-    inertia = cast(inertia)
-    if inertia.shape or (is_concrete(inertia) and not inertia > 0):
-        raise ValueError(f"`inertia` is {inertia}; it must be one positive number, in kg m^2.")
+    wanted = cast(inertia)
+    if wanted.shape or (is_concrete(wanted) and not 0 < wanted < np.inf):
+        raise ValueError(f"`inertia` is {wanted}; it must be one positive, finite number, in kg m^2.")
     mass, com, moment, axes, anchor = map(cast, (robot.mass, robot.com, robot.inertia, robot.axis, robot.anchor))
     eye = np.eye(3, dtype=com.dtype)
 
@@ -191,7 +193,7 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
         across = eye - along
         lever = com[link] - point
         present = (along * moment[link]).sum() + mass[link] * (lever @ across @ lever)
-        stretch = xp.sqrt(inertia / present) * across + along
+        stretch = xp.sqrt(wanted / present) * across + along
         spread = stretch @ (xp.trace(moment[link]) / 2 * eye - moment[link]) @ stretch  # second moments of mass
         return point + stretch @ lever, xp.trace(spread) * eye - spread
 

@@ -39,7 +39,7 @@ def six_body() -> Robot:
         mass=[link.mass for link in links],
         com=[link.com for link in links],
         inertia=[link.inertia for link in links],
-        axis=[fold, (0, 0, -1), (1, 0, 0), (0, 0, -1), fold * (-1, 1, -1)],
+        axis=np.array([fold, (0, 0, -1), (1, 0, 0), (0, 0, -1), fold * (-1, 1, -1)]),
         anchor=[(0, 0, 0), down_shank, down_middle, down_middle, down_shank],
         rotor_inertia=[ROTOR_INERTIA] * 5,
         gear_ratio=[GEAR_RATIO] * 5,
