@@ -227,7 +227,7 @@ def _record(design: np.ndarray, result: Outcome) -> dict[str, float]:
 
 
 def _print_table(thesis: Outcome, best: Solution) -> None:
-    rows = [("", "thesis", "best")]
+    rows: list[tuple[str, ...]] = [("", "thesis", "best")]
     for name, field in (("roll", "roll"), ("off-axis angle", "off_axis"), ("joint travel", "travel")):
         rows.append((f"{name} [deg]", *(f"{np.rad2deg(getattr(o, field)):.4f}" for o in (thesis, best.outcome))))
     for name, unit, *values in zip(NAMES, UNITS, THESIS, best.design, strict=True):

@@ -18,8 +18,8 @@ from reojax._fast.product import ordered_products, to_matrix
 from reojax.path import Path
 from reojax.robot import Robot
 
-DEFAULT_STEPS = 5
-"""Steps per edge that bring every named robot's manoeuvres within 1e-9 rad (30 evaluations of omega an edge)."""
+DEFAULT_STEPS = 4
+"""Steps per edge that bring every named robot's manoeuvres within 1e-9 rad (32 evaluations of omega an edge)."""
 
 
 def net_rotation(robot: Robot, path: Path, *, steps: int = DEFAULT_STEPS) -> Float[Array, "3 3"]:
@@ -27,7 +27,7 @@ def net_rotation(robot: Robot, path: Path, *, steps: int = DEFAULT_STEPS) -> Flo
 
     Takes base components at the end to base components at the start (inertial components, if the base
     starts aligned). Magnus method on the rotation group, in a frame that turns with the mean of omega over a
-    step, with six Gauss nodes a step: all nodes are evaluated at once, and the error falls at least with
+    step, with eight Gauss nodes a step: all nodes are evaluated at once, and the error falls at least with
     the tenth power of the step while the solution is resolved. Compare `steps` with `2 * steps` for an
     estimate of the error.
 

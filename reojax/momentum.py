@@ -15,7 +15,7 @@ the last sum over the motors' rotors, which spin about their joints' axes `e_k` 
 links that carry them.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -53,7 +53,7 @@ class MomentumMatrices(NamedTuple):
     """Minus the momentum that unit joint rates give while the base does not turn."""
 
 
-def _as_arrays(robot: Robot, *motion: Array) -> tuple[Robot, ...]:
+def _as_arrays(robot: Robot, *motion: Array) -> Any:
     dtype = common_float(robot, motion)
     return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), (robot, *motion))
 
@@ -62,15 +62,14 @@ def _check(robot: Robot, **motion: Array) -> None:
     for entry, value in motion.items():
         expected = (3,) if entry == "omega" else (robot.joints,)
         if jnp.shape(value) != expected:
-            raise ValueError(
-                f"`{entry}` has shape {jnp.shape(value)}; for {robot.name!r} ({robot.joints} joints) it must be {expected}."
-            )
+            robot_size = f"{robot.name!r} ({robot.joints} joints)"
+            raise ValueError(f"`{entry}` has shape {jnp.shape(value)}; for {robot_size} it must be {expected}.")
 
 
 def joint_rotation(axis: Float[Array, "3"], angle: Float[Array, ""]) -> Float[Array, "3 3"]:
     """Rotation by `angle` [rad] about the unit vector `axis` (Rodrigues)."""
     c, s = jnp.cos(angle), jnp.sin(angle)
-    return c * jnp.eye(3, dtype=axis.dtype) + s * hat(axis) + (1 - c) * jnp.outer(axis, axis)
+    return c * jnp.eye(3, dtype=axis.dtype) + s * hat(axis) + (1 - c) * axis[:, None] * axis[None, :]
 
 
 def kinematics(robot: Robot, theta: Float[Array, " j"]) -> Kinematics:
@@ -85,9 +84,10 @@ def kinematics(robot: Robot, theta: Float[Array, " j"]) -> Kinematics:
     rotation, origin, axis = [jnp.eye(3, dtype=theta.dtype)], [zero[:, :0].sum(1)], []
     turn, shift = [zero], [zero]  # `shift` of the link's origin, base at rest
     for k, p in enumerate(robot.parent):
-        axis.append(rotation[p] @ robot.axis[k])
+        unit = robot.axis[k] / jnp.sqrt(robot.axis[k] @ robot.axis[k])
+        axis.append(rotation[p] @ unit)
         arm = rotation[p] @ robot.anchor[k]
-        rotation.append(rotation[p] @ joint_rotation(robot.axis[k], theta[k]))
+        rotation.append(rotation[p] @ joint_rotation(unit, theta[k]))
         origin.append(origin[p] + arm)
         turn.append(turn[p].at[:, k].set(axis[k]))
         shift.append(shift[p] - hat(arm) @ turn[p])

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from reojax._arrays import is_concrete
-from reojax._fast.scalar import Scalar, Symmetric, Vector
+from reojax._fast.scalar import Scalar, Symmetric, Vector, dot
 from reojax.robot import Robot
 
 _FIELDS = ("mass", "com", "inertia", "axis", "anchor", "rotor_inertia", "gear_ratio")
@@ -59,7 +59,7 @@ def components(robot: Robot, pattern: Pattern, dtype: np.dtype) -> Components:
         mass=mass,
         com=com,
         inertia=[_symmetric_part(rows) for rows in inertia],
-        axis=axis,
+        axis=[_unit(e) for e in axis],
         anchor=anchor,
         rotor_spin=[sign * (j * n) for sign, j, n in zip(signs, rotor, gear, strict=True)],
         parent=robot.parent,
@@ -81,6 +81,14 @@ def _scalars(leaf: jax.Array, known: bytes | None) -> Any:
     for size in reversed(leaf.shape[1:]):
         entries = [tuple(entries[i : i + size]) for i in range(0, len(entries), size)]
     return entries
+
+
+def _unit(axis: Vector) -> Vector:
+    """Return the axis at unit length, so that its array may be varied in any direction."""
+    if all(isinstance(c, int) for c in axis):
+        return axis
+    length = jnp.sqrt(dot(axis, axis))
+    return tuple(0 if isinstance(c, int) and c == 0 else c / length for c in axis)
 
 
 def _symmetric_part(rows: Any) -> Symmetric:

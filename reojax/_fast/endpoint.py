@@ -75,7 +75,7 @@ def _end_rotation_jvp(steps, pattern, primals, tangents):
         )
 
     _, change = jax.jvp(momentum, ([leaves[i] for i in moving],), ([changes[i] for i in moving],))
-    change_of_omega = solve(base.inertia, scale(-1, change))
+    change_of_omega = _at_nodes(solve(base.inertia, scale(-1, change)), theta[0])
     in_step = mean_over_step(rotate(step.inside(), change_of_omega))
     x, y, z = (c.sum() for c in rotate(times(before, step.half), in_step))
     turn = jnp.stack([x, y, z])

@@ -26,7 +26,7 @@ def angular_momentum(
     `p + E p'`, `h + E h' + a x E p'`, and the rotors.
     """
     moment = [times(m, c) for m, c in zip(robot.mass, robot.com, strict=True)]
-    inertia = [plus(i, point_inertia(*mc)) for i, *mc in zip(robot.inertia, robot.mass, robot.com, strict=True)]
+    inertia = [plus(i, point_inertia(m, c)) for i, m, c in zip(robot.inertia, robot.mass, robot.com, strict=True)]
     joints = range(len(robot.parent))
     E = [joint_rotation(e, *sc) for e, sc in zip(robot.axis, sine_cosine, strict=True)]
     w, v = [omega], [velocity]

@@ -9,10 +9,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-_x, _w = np.polynomial.legendre.leggauss(6)
+_x, _w = np.polynomial.legendre.leggauss(8)
 
 NODES: np.ndarray = 0.5 * (_x + 1)
-"""Gauss nodes in a step, as fractions of the step: a quadrature of order 12."""
+"""Gauss nodes in a step, as fractions of the step: a quadrature of order 16."""
 WEIGHTS: np.ndarray = 0.5 * _w
 """Their weights, for a step of length 1."""
 LEGENDRE: np.ndarray = np.polynomial.legendre.legvander(_x, len(_x) - 1)

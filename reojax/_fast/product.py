@@ -5,8 +5,10 @@ import math
 import jax
 import jax.numpy as jnp
 
-Quaternion = tuple[jax.Array, jax.Array, jax.Array, jax.Array]
-Triple = tuple[jax.Array, jax.Array, jax.Array]
+Quaternion = tuple[jax.Array, ...]
+"""w, x, y, z."""
+Triple = tuple[jax.Array, ...]
+"""x, y, z."""
 
 
 def times(a: Quaternion, b: Quaternion) -> Quaternion:

@@ -9,10 +9,12 @@ from typing import TypeAlias
 import jax
 
 Scalar: TypeAlias = jax.Array | float | int
-Vector: TypeAlias = tuple[Scalar, Scalar, Scalar]
-Symmetric: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Scalar, Scalar]
+Vector: TypeAlias = tuple[Scalar, ...]
+"""x, y, z."""
+Symmetric: TypeAlias = tuple[Scalar, ...]
 """xx, yy, zz, xy, xz, yz."""
-Matrix: TypeAlias = tuple[Vector, Vector, Vector]
+Matrix: TypeAlias = tuple[Vector, ...]
+"""Three rows."""
 
 ZERO: Vector = (0, 0, 0)
 

@@ -1,22 +1,23 @@
-"""From omega at the nodes of a step to the rotation over the step: `R' = R hat(omega)`, order 12 quadrature.
+"""From omega at the nodes of a step to the rotation over the step: `R' = R hat(omega)`, by eight Gauss nodes a step.
 
-The equation is linear, so all nodes of all steps are evaluated beforehand, at once. With six Gauss nodes s_i
-in a step and time scaled to it, three changes of frame make what is left to integrate smaller and smaller:
+The equation is linear, so all nodes of all steps are evaluated beforehand, at once. With Gauss nodes s_i in
+a step and time scaled to it, three changes of frame make what is left to integrate smaller and smaller:
 
 1. Mean: with `wbar` the mean of omega over the step, `R = exp(wbar / 2) Q exp((s - 1/2) wbar)` leaves
    `Q' = Q hat(u)`,   `u = exp((s - 1/2) wbar) (omega - wbar)`.
 2. Fer (F. Fer, Bull. Acad. Roy. Belg. 44, 818-829, 1958): with `U(s)` the integral of u from 0 to s,
    `Q = P exp(U(s))` leaves `P' = P hat(v)`, `v = (exp(U) - J(U)) u` with J the left Jacobian of exp: the
    commutator `U x u / 2` and beyond, of second order in u.
-3. Magnus: `P(1) = exp(m_0 + (m_0 x m_1 + m_1 x m_2) / 2)`, with m_n the integral of v times the n-th Legendre
-   polynomial: the second term of the Magnus series, half the integral of `V x v`.
+3. Magnus: `P(1) = exp(m_0 + (m_0 x m_1 + m_1 x m_2 + ...) / 2)`, with m_n the integral of v times the n-th
+   Legendre polynomial: the second term of the Magnus series, half the integral of `V x v`.
 
 The rotation over the step is `exp(wbar / 2) P(1) exp(U(1)) exp(wbar / 2)`. Integrals are products with
-constant 6x6 matrices; on CPU a matrix product is also what makes XLA store its operand once instead of
+constant 8x8 matrices; on CPU a matrix product is also what makes XLA store its operand once instead of
 computing it again for every reader.
 """
 
 from collections.abc import Callable
+from itertools import pairwise
 from math import factorial
 from typing import NamedTuple
 
@@ -28,8 +29,8 @@ from reojax._fast.nodes import LEGENDRE, NODES, WEIGHTS, per_step
 from reojax._fast.product import Quaternion, Triple, times
 from reojax._fast.sincos import horner, sincos
 
-_MOMENTS = WEIGHTS[:, None] * LEGENDRE[:, :3]
-"""values (steps, 6) @ _MOMENTS = integrals of the values times the first three Legendre polynomials."""
+_MOMENTS = WEIGHTS[:, None] * LEGENDRE[:, :6]
+"""values (steps, 8) @ _MOMENTS = integrals of the values times the first six Legendre polynomials."""
 _MEAN_AT_NODES = np.repeat(WEIGHTS[:, None], len(NODES), axis=1)
 
 
@@ -40,7 +41,7 @@ def _running_integral() -> np.ndarray:
 
 
 _INTEGRAL = _running_integral()
-"""values (steps, 6) @ _INTEGRAL = integrals of the values from the step's start to each node."""
+"""values (steps, 8) @ _INTEGRAL = integrals of the values from the step's start to each node."""
 
 _COS0 = tuple((-1) ** k / factorial(2 * k) for k in range(8))
 _SIN1 = tuple((-1) ** k / factorial(2 * k + 1) for k in range(8))  # sin t / t in t^2
@@ -49,7 +50,7 @@ _SIN3 = tuple((-1) ** k / factorial(2 * k + 3) for k in range(8))  # (t - sin t)
 _FER_1 = tuple(a - b for a, b in zip(_SIN1, _COS2, strict=True))
 _FER_2 = tuple(a - b for a, b in zip(_COS2, _SIN3, strict=True))
 _SERIES_END = 10.0
-"""Angles within a step stay below this root (180 degrees) or the step is too long for six nodes anyway."""
+"""Angles within a step stay below this root (180 degrees) or the step is too long for eight nodes anyway."""
 
 
 def _dot(a: Triple, b: Triple) -> jax.Array:
@@ -72,8 +73,7 @@ def _moments(values: Triple, count: int) -> list[Triple]:
 
 
 def _combine(*terms: tuple[jax.Array | float, Triple]) -> Triple:
-    x, y, z = (sum(c * v[i] for c, v in terms) for i in range(3))
-    return x, y, z
+    return tuple(sum((c * v[i] for c, v in terms[1:]), start=terms[0][0] * terms[0][1][i]) for i in range(3))
 
 
 class Step(NamedTuple):
@@ -91,15 +91,15 @@ def step_rotations(omega: Triple) -> Step:
     """Solve `R' = R hat(omega)` over each step.
 
     Args:
-        omega: angular velocity times the step's duration at the nodes of all steps, three arrays (steps * 6,).
+        omega: angular velocity times the step's duration at the nodes of all steps, three arrays (steps * 8,).
     """
     s = jnp.asarray(np.tile(NODES - 0.5, omega[0].shape[0] // len(NODES)), omega[0].dtype)
     mean = _at_nodes(omega, _MEAN_AT_NODES)
     u = _to_mean_frame(s, omega, mean)
     turned = _at_nodes(u, _INTEGRAL)
     v = _fer(u, turned)
-    m0, m1, m2 = _moments(v, 3)
-    first = _combine((1.0, m0), (0.5, _cross(m0, m1)), (0.5, _cross(m1, m2)))
+    m = _moments(v, _MOMENTS.shape[1])
+    first = _combine((1.0, m[0]), *((0.5, _cross(a, b)) for a, b in pairwise(m)))
     half = _exp(_combine((0.5, _moments(omega, 1)[0])))
     rotation = times(times(half, times(_exp_small(first), _exp_small(_moments(u, 1)[0]))), half)
 

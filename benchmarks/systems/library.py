@@ -1,0 +1,96 @@
+"""reojax, through its public functions under `jax.jit(jax.vmap(...))`."""
+
+from collections.abc import Iterator
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import reojax
+from reojax import Robot
+from reojax.holonomy import DEFAULT_STEPS
+
+from . import _under_vmap
+from ._measure import CORES, compiled, fewest, measure
+from ._rows import Row, row
+from ._task import TOLERANCE, Task, net_rotation, objective, robot_of
+
+NODES = 6
+"""Evaluations of omega in a step."""
+
+
+def float64(task: Task) -> Iterator[Row]:
+    """Rows in float64."""
+    for steps in _steps(task):
+        yield from _four_variables(task, steps, np.float64)
+        yield from _every_array(task, steps)
+
+
+def float32(task: Task) -> Iterator[Row]:
+    """Rows in float32, with the steps of float64."""
+    for steps in _steps(task):
+        yield from _four_variables(task, steps, np.float32)
+
+
+def _steps(task: Task) -> list[int]:
+    """What the tolerance takes, and the default."""
+    loops = task.reference.loops
+
+    def error(steps: int) -> float:
+        call, _ = compiled(jax.vmap(lambda loop: net_rotation(loop, steps)), loops)
+        return task.error(np.asarray(call(loops)))
+
+    return [fewest(error, TOLERANCE), DEFAULT_STEPS]
+
+
+def _name(steps: int) -> str:
+    return "at its default steps" if steps == DEFAULT_STEPS else "at the tolerance"
+
+
+def _four_variables(task: Task, steps: int, dtype: type) -> Iterator[Row]:
+    yield from _under_vmap.rows(
+        task,
+        f"reojax, {np.dtype(dtype).name}, {_name(steps)}",
+        lambda loop: net_rotation(loop, steps),
+        loops=len(task.loops.twist),
+        steps=steps,
+        evaluations=4 * NODES * steps,
+        dtype=dtype,
+    )
+
+
+def _every_array(task: Task, steps: int) -> Iterator[Row]:
+    """Rows with every array of the robot given loop by loop, and differentiated, with both amplitudes."""
+    loops, system = task.loops, f"reojax, float64, {_name(steps)}"
+    robots = jax.jit(jax.vmap(lambda loop: jax.tree.map(jnp.asarray, robot_of(loop))))(loops)
+    batch = robots, loops.twist, loops.bend
+
+    def rotation(robot: Robot, twist: jax.Array, bend: jax.Array) -> jax.Array:
+        return reojax.net_rotation(robot, reojax.manoeuvre_a(twist, bend), steps=steps)
+
+    def number(*design) -> jax.Array:
+        return objective(rotation(*design))
+
+    value, value_compile = compiled(jax.vmap(rotation), *batch)
+    gradient, gradient_compile = compiled(jax.vmap(jax.value_and_grad(number, argnums=(0, 1, 2))), *batch)
+    timed = measure([lambda: value(*batch), lambda: gradient(*batch)], task.seconds)
+    shared = dict(
+        loops=len(loops.twist),
+        threads=CORES,
+        steps=steps,
+        evaluations=4 * NODES * steps,
+        error=task.error(np.asarray(value(*batch))[: task.checked]),
+    )
+    yield row(system, "value, every array given", timed[0], compile=value_compile, **shared)
+    by_robot, by_twist, by_bend = gradient(*batch)[1]
+    chained = jax.jit(jax.vmap(lambda loop, slope: jax.vjp(robot_of, loop)[1](slope)[0]))(loops, by_robot)
+    slopes = np.stack([by_twist, by_bend, chained.inertia, chained.ratio], axis=1)[: task.checked]
+    yield row(
+        system,
+        "value and gradient, every array",
+        timed[1],
+        gradient_error=task.gradient_error(slopes),
+        compile=gradient_compile,
+        value=timed[0],
+        **shared,
+    )
