@@ -40,7 +40,7 @@ class Robot:
     inertia: Float[Array, "n 3 3"]
     """Inertia about each link's centre of mass, in the link's own frame [kg m^2]."""
     axis: Float[Array, "j 3"]
-    """Joint axes, unit length; `theta[k]` turns the child about `axis[k]`, right-handed."""
+    """Joint axes; `theta[k]` turns the child about `axis[k]`, right-handed. Only the direction counts."""
     anchor: Float[Array, "j 3"]
     """Position of each joint in its parent link's frame [m]."""
     rotor_inertia: Float[Array, " j"]

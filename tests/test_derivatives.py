@@ -28,9 +28,8 @@ def test_robots_have_what_is_differentiated():
 
 
 def outcome(robot, waypoints):
-    """Rotation vector and angle of the net rotation. Axes are unit vectors: only their directions are free."""
-    length = jnp.sqrt((robot.axis**2).sum(axis=1, keepdims=True))
-    rotation = net_rotation(robot.replace(axis=robot.axis / length), polygon(waypoints))
+    """Rotation vector and angle of the net rotation."""
+    rotation = net_rotation(robot, polygon(waypoints))
     return jnp.append(reojax.so3.log(rotation), reojax.so3.angle(rotation))
 
 
