@@ -9,6 +9,7 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from reojax._arrays import Array, common_float
@@ -40,7 +41,7 @@ def net_rotation(robot: Robot, path: Path, *, steps: int = DEFAULT_STEPS) -> Flo
         ValueError: if the path's joints do not match the robot's, or `steps` is not a positive integer.
     """
     _check(robot, path, "steps", steps)
-    return _net_rotation(robot, path.waypoints, steps, pattern_of(robot))
+    return _net_rotation(robot, path.waypoints, int(steps), pattern_of(robot))
 
 
 def rotation_history(robot: Robot, path: Path, *, samples: int) -> Float[Array, "m 3 3"]:
@@ -59,17 +60,19 @@ def rotation_history(robot: Robot, path: Path, *, samples: int) -> Float[Array, 
         ValueError: if the path's joints do not match the robot's, or `samples` is not a positive integer.
     """
     _check(robot, path, "samples", samples)
-    return _rotation_history(robot, path.waypoints, samples, pattern_of(robot))
+    return _rotation_history(robot, path.waypoints, int(samples), pattern_of(robot))
 
 
 def _check(robot: Robot, path: Path, entry: str, count: int) -> None:
+    if not isinstance(robot, Robot):
+        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
     if not isinstance(path, Path):
-        raise ValueError(f"`path` is {path!r}; it must be a Path, such as `polygon(waypoints)` makes.")
+        raise ValueError(f"`path` is a {type(path).__name__}; it must be a Path, such as `polygon(waypoints)` makes.")
     if path.joints != robot.joints:
         raise ValueError(
             f"`path` has waypoints of {path.joints} joint angles; {robot.name!r} has {robot.joints} joints."
         )
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise ValueError(f"`{entry}` is {count!r}; it must be a positive integer.")
 
 

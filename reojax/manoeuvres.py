@@ -90,18 +90,22 @@ def _shape(layout: Layout, angles: dict[int, float]) -> np.ndarray:
 
 
 def _amplitude(entry: str, value: ArrayLike) -> jax.Array | np.ndarray:
-    if not isinstance(value, jax.Array):
-        value = np.asarray(value)
-    if np.issubdtype(value.dtype, np.integer):
-        value = value.astype(float)
-    if value.shape or not np.issubdtype(value.dtype, np.floating):
+    try:
+        number = value if isinstance(value, jax.Array) else np.asarray(value)
+    except ValueError as error:  # a ragged list
+        raise ValueError(f"`{entry}` is {value!r}; it must be one real number, in radians.") from error
+    if np.issubdtype(number.dtype, np.integer):
+        number = number.astype(float)
+    if number.shape or not np.issubdtype(number.dtype, np.floating):
         raise ValueError(f"`{entry}` is {value!r}; it must be one real number, in radians.")
-    if is_concrete(value) and not np.isfinite(value):
+    if is_concrete(number) and not np.isfinite(number):
         raise ValueError(f"`{entry}` is {value}; it must be finite.")
-    return value
+    return number
 
 
 def _check_layout(layout: Layout) -> None:
+    if not isinstance(layout, Layout):
+        raise ValueError(f"`layout` is {layout!r}; it must be a Layout, such as FOUR_BODY.")
     used: Sequence[int] = (*layout.twist, layout.bend, *(layout.fold or ()))
     for joint in used:
         if not 0 <= joint < layout.joints:

@@ -19,9 +19,10 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
-from reojax._arrays import Array, common_float
+from reojax._arrays import Array, common_float, is_concrete
 from reojax._smallmat import solve_symmetric3
 from reojax.robot import Robot
 from reojax.so3 import hat
@@ -59,11 +60,15 @@ def _as_arrays(robot: Robot, *motion: Array) -> Any:
 
 
 def _check(robot: Robot, **motion: Array) -> None:
+    if not isinstance(robot, Robot):
+        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
     for entry, value in motion.items():
         expected = (3,) if entry == "omega" else (robot.joints,)
         if jnp.shape(value) != expected:
             robot_size = f"{robot.name!r} ({robot.joints} joints)"
             raise ValueError(f"`{entry}` has shape {jnp.shape(value)}; for {robot_size} it must be {expected}.")
+        if is_concrete(value) and not np.isfinite(value).all():
+            raise ValueError(f"`{entry}` is {np.asarray(value).tolist()}; it must be finite.")
 
 
 def joint_rotation(axis: Float[Array, "3"], angle: Float[Array, ""]) -> Float[Array, "3 3"]:
@@ -76,7 +81,7 @@ def kinematics(robot: Robot, theta: Float[Array, " j"]) -> Kinematics:
     """Poses and Jacobians of all links at joint angles `theta` [rad], in the base frame.
 
     Raises:
-        ValueError: if `theta` has the wrong shape.
+        ValueError: if `theta` has the wrong shape or is not finite.
     """
     _check(robot, theta=theta)
     robot, theta = _as_arrays(robot, theta)
@@ -116,7 +121,7 @@ def momentum_matrices(robot: Robot, theta: Float[Array, " j"]) -> MomentumMatric
         `A` (3, 3) and `B` (3, j) [kg m^2], in the base frame, about the centre of mass.
 
     Raises:
-        ValueError: if `theta` has the wrong shape.
+        ValueError: if `theta` has the wrong shape or is not finite.
     """
     pose = kinematics(robot, theta)
     robot, theta = _as_arrays(robot, theta)
@@ -139,7 +144,7 @@ def connection(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "3 j"]:
     `omega = connection(robot, theta) @ theta_dot` at zero angular momentum (thesis 2.5).
 
     Raises:
-        ValueError: if `theta` has the wrong shape.
+        ValueError: if `theta` has the wrong shape or is not finite.
     """
     A, B = momentum_matrices(robot, theta)
     return solve_symmetric3(A, B)
@@ -157,7 +162,7 @@ def angular_momentum(
         omega: (3,) angular velocity of the base, base frame [rad/s].
 
     Raises:
-        ValueError: if an argument has the wrong shape.
+        ValueError: if an argument has the wrong shape or is not finite.
     """
     _check(robot, theta=theta, theta_dot=theta_dot, omega=omega)
     robot, theta, theta_dot, omega = _as_arrays(robot, theta, theta_dot, omega)
