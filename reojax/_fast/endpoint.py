@@ -19,11 +19,12 @@ from jax.custom_derivatives import SymbolicZero
 from reojax._fast.components import Components, Pattern, components
 from reojax._fast.momentum import angular_momentum
 from reojax._fast.nodes import path_nodes, to_nodes
-from reojax._fast.omega import inward, solve
+from reojax._fast.omega import Base, inward, solve
 from reojax._fast.product import Triple, ordered_products, rotate, times, to_matrix
 from reojax._fast.scalar import cross, plus, times as scale
 from reojax._fast.sincos import sincos
 from reojax._fast.steps import Step, mean_over_step, step_rotations
+from reojax._fast.store import keeper
 from reojax.robot import Robot
 
 
@@ -49,8 +50,10 @@ def end_rotation(steps: int, pattern: Pattern, robot: Robot, points: jax.Array) 
 def _end_rotation_jvp(steps, pattern, primals, tangents):
     robot, points = primals
     theta, rate = path_nodes(points, steps)
-    sine_cosine = [sincos(angle) for angle in theta]
+    keep = keeper(theta[0])
+    sine_cosine = [keep(sincos(angle)) for angle in theta]
     base = inward(components(robot, pattern, points.dtype), sine_cosine, rate)
+    base = Base(*(keep(part) for part in base))
     omega = _at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0])
     step = step_rotations(omega)
     total, before = ordered_products(step.rotation)
@@ -70,13 +73,12 @@ def _end_rotation_jvp(steps, pattern, primals, tangents):
         robot, points = jax.tree.unflatten(structure, now)
         theta, rate = path_nodes(points, steps)
         parts = _spread_components(components(robot, pattern, points.dtype), theta[0])
-        return _at_nodes(
-            angular_momentum(parts, [sincos(a) for a in theta], rate, omega, velocity, base.centre), theta[0]
-        )
+        of_all = angular_momentum(parts, [sincos(a) for a in theta], rate, omega, velocity, base.centre, keep)
+        return _at_nodes(of_all, theta[0])
 
     _, change = jax.jvp(momentum, ([leaves[i] for i in moving],), ([changes[i] for i in moving],))
     change_of_omega = _at_nodes(solve(base.inertia, scale(-1, change)), theta[0])
-    in_step = mean_over_step(rotate(step.inside(), change_of_omega))
+    in_step = mean_over_step(step.inside(keep(change_of_omega), keep))
     x, y, z = (c.sum() for c in rotate(times(before, step.half), in_step))
     turn = jnp.stack([x, y, z])
     return rotation, jnp.cross(turn[:, None], rotation, axis=0)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from reojax._fast.components import Components
 from reojax._fast.omega import apply_symmetric, joint_rotation
 from reojax._fast.scalar import Scalar, Vector, apply, cross, mul, plus, point_inertia, times, transpose
+from reojax._fast.store import Keep
 
 
 def angular_momentum(
@@ -18,12 +19,14 @@ def angular_momentum(
     omega: Vector,
     velocity: Vector,
     centre: Vector,
+    keep: Keep,
 ) -> Vector:
     """Angular momentum about the point `centre` (base frame) when the base moves with `omega` and `velocity`.
 
     Outward, each link's angular velocity `w` and its origin's velocity `v`, in its own frame:
     `w' = E^T w + rate e`, `v' = E^T (v + w x a)`. There, momentum `p = m v + w x f`, `h = J w + f x v`. Inward,
-    `p + E p'`, `h + E h' + a x E p'`, and the rotors.
+    `p + E p'`, `h + E h' + a x E p'`, and the rotors. Values are kept link by link (`store`), and so is what
+    reverse differentiation carries outward.
     """
     moment = [times(m, c) for m, c in zip(robot.mass, robot.com, strict=True)]
     inertia = [plus(i, point_inertia(m, c)) for i, m, c in zip(robot.inertia, robot.mass, robot.com, strict=True)]
@@ -32,14 +35,14 @@ def angular_momentum(
     w, v = [omega], [velocity]
     for k in joints:
         outward, parent = transpose(E[k]), robot.parent[k]
-        w.append(plus(apply(outward, w[parent]), times(rate[k], robot.axis[k])))
-        v.append(apply(outward, plus(v[parent], cross(w[parent], robot.anchor[k]))))
+        w.append(keep(plus(apply(outward, w[parent]), times(rate[k], robot.axis[k]))))
+        v.append(keep(apply(outward, plus(v[parent], cross(w[parent], robot.anchor[k])))))
     p = [plus(times(m, v_), cross(w_, f)) for m, f, v_, w_ in zip(robot.mass, moment, v, w, strict=True)]
     h = [plus(apply_symmetric(J, w_), cross(f, v_)) for J, f, v_, w_ in zip(inertia, moment, v, w, strict=True)]
     for k in reversed(joints):
         link, parent = k + 1, robot.parent[k]
-        push = apply(E[k], p[link])
+        push = apply(E[k], keep(p[link]))
         rotor = times(mul(rate[k], robot.rotor_spin[k]), robot.axis[k])
         p[parent] = plus(p[parent], push)
-        h[parent] = plus(h[parent], plus(plus(apply(E[k], h[link]), rotor), cross(robot.anchor[k], push)))
+        h[parent] = plus(h[parent], plus(plus(apply(E[k], keep(h[link])), rotor), cross(robot.anchor[k], push)))
     return plus(h[0], times(-1, cross(centre, p[0])))

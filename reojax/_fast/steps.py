@@ -28,6 +28,7 @@ import numpy as np
 from reojax._fast.nodes import LEGENDRE, NODES, WEIGHTS, per_step
 from reojax._fast.product import Quaternion, Triple, times
 from reojax._fast.sincos import horner, sincos
+from reojax._fast.store import Keep
 
 _MOMENTS = WEIGHTS[:, None] * LEGENDRE[:, :6]
 """values (steps, 8) @ _MOMENTS = integrals of the values times the first six Legendre polynomials."""
@@ -83,8 +84,8 @@ class Step(NamedTuple):
     """Over the whole step, four arrays (steps,)."""
     half: Quaternion
     """`exp(wbar / 2)`, four arrays (steps,)."""
-    inside: Callable[[], Quaternion]
-    """`P(s) exp(U(s)) exp((s - 1/2) wbar)` at the nodes, four arrays of nodes."""
+    inside: Callable[[Triple, Keep], Triple]
+    """Turns vectors at the nodes by `P(s) exp(U(s)) exp((s - 1/2) wbar)`, keeping what is in between."""
 
 
 def step_rotations(omega: Triple) -> Step:
@@ -95,7 +96,7 @@ def step_rotations(omega: Triple) -> Step:
     """
     s = jnp.asarray(np.tile(NODES - 0.5, omega[0].shape[0] // len(NODES)), omega[0].dtype)
     mean = _at_nodes(omega, _MEAN_AT_NODES)
-    u = _to_mean_frame(s, omega, mean)
+    u = _rotate(_combine((s, mean)), _combine((1.0, omega), (-1.0, mean)))
     turned = _at_nodes(u, _INTEGRAL)
     v = _fer(u, turned)
     m = _moments(v, _MOMENTS.shape[1])
@@ -103,9 +104,10 @@ def step_rotations(omega: Triple) -> Step:
     half = _exp(_combine((0.5, _moments(omega, 1)[0])))
     rotation = times(times(half, times(_exp_small(first), _exp_small(_moments(u, 1)[0]))), half)
 
-    def inside() -> Quaternion:
-        fer = times(_exp_small(_at_nodes(v, _INTEGRAL)), _exp_small(turned))
-        return times(fer, _exp_small(_combine((s, mean))))
+    def inside(vectors: Triple, keep: Keep) -> Triple:
+        for turn in (_combine((s, mean)), turned, _at_nodes(v, _INTEGRAL)):
+            vectors = keep(_rotate(turn, vectors))
+        return vectors
 
     return Step(rotation, half, inside)
 
@@ -115,11 +117,11 @@ def mean_over_step(values: Triple) -> Triple:
     return _moments(values, 1)[0]
 
 
-def _to_mean_frame(s: jax.Array, omega: Triple, mean: Triple) -> Triple:
-    rest = _combine((1.0, omega), (-1.0, mean))
-    square = jnp.minimum(s * s * _dot(mean, mean), _SERIES_END)
-    p = _cross(mean, rest)
-    return _combine((1.0, rest), (s * horner(_SIN1, square), p), (s * s * horner(_COS2, square), _cross(mean, p)))
+def _rotate(by: Triple, vectors: Triple) -> Triple:
+    """Turn vectors by rotation vectors below a half turn: `v + sinc b x v + cosc b x (b x v)`, by power series."""
+    square = jnp.minimum(_dot(by, by), _SERIES_END)
+    p = _cross(by, vectors)
+    return _combine((1.0, vectors), (horner(_SIN1, square), p), (horner(_COS2, square), _cross(by, p)))
 
 
 def _fer(u: Triple, turned: Triple) -> Triple:
