@@ -35,5 +35,6 @@ def build(source: str, flags: Sequence[str]) -> tuple[ctypes.CDLL, float]:
 
 def pointer(array: np.ndarray) -> ctypes.c_void_p:
     """Return the address of a contiguous float64 array, for a call during which the array lives."""
-    assert array.dtype == np.float64 and array.flags.c_contiguous
+    assert array.dtype == np.float64
+    assert array.flags.c_contiguous
     return ctypes.c_void_p(array.ctypes.data)

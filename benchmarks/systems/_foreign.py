@@ -9,24 +9,30 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-ORACLES = Path(__file__).resolve().parents[2] / "tests" / "oracles.py"
+TESTS = Path(__file__).resolve().parents[2] / "tests"
 
 
 @cache
-def oracles() -> ModuleType:
-    """Load `tests/oracles.py` from where it lies."""
-    spec = importlib.util.spec_from_file_location("oracles", ORACLES)
-    assert spec is not None and spec.loader is not None
+def from_tests(name: str) -> ModuleType:
+    """Load a module of the tests from where it lies."""
+    spec = importlib.util.spec_from_file_location(name, TESTS / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
+def oracles() -> ModuleType:
+    """Load `tests/oracles.py`."""
+    return from_tests("oracles")
+
+
 def omega_of(momentum: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """Angular velocity of the base (m, 3) without momentum, of momentum matrices (m, 3, 6 + j) and rates (m, j).
 
-    The matrices are about the centre of mass, in base axes, their columns the base's linear and angular velocity and the
-    joint rates.
+    The matrices are about the centre of mass, in base axes; their columns are the base's linear velocity, its angular
+    velocity and the joint rates.
     """
     h = np.einsum("mij,mj->mi", momentum[:, :, 6:], rate)
     return -np.linalg.solve(momentum[:, :, 3:6], h[:, :, None])[:, :, 0]

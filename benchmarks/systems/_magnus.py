@@ -5,6 +5,7 @@ On every edge, `R' = R hat(omega)`; over a step `exp((w1 + w2) / 2 + sqrt(3) / 1
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -49,23 +50,31 @@ def product(omega: np.ndarray) -> np.ndarray:
     return rotations[0]
 
 
-def rotation(omega: Callable[[jax.Array, jax.Array], jax.Array], loop: Loops, steps: int) -> jax.Array:
+def rotation(omega: Callable[[jax.Array, jax.Array], Any], loop: Loops, steps: int) -> jax.Array:
     """Rotation (3, 3) after one loop, all nodes under `vmap`; `omega(theta, rate)` is the base's angular velocity."""
-    corners = path_of(loop).waypoints
-    at = ((jnp.arange(steps)[:, None] + GAUSS) / steps).reshape(-1)
-    rate = jnp.diff(corners, axis=0) / steps
-    theta = corners[:-1, None] + at[None, :, None] * (rate * steps)[:, None]
-    w = jax.vmap(omega)(theta.reshape(-1, 3), jnp.repeat(rate, len(at), axis=0)).reshape(-1, NODES, 3)
-    turns = jax.vmap(_turn)(w)
-    return jax.lax.scan(lambda done, turn: (done @ so3.exp(turn), None), jnp.eye(3, dtype=w.dtype), turns)[0]
+    return traced_product(jax.vmap(omega)(*traced_nodes(loop, steps)))
+
+
+def traced_nodes(loop: Loops, steps: int) -> tuple[jax.Array, jax.Array]:
+    """Same as `nodes`, in JAX."""
+    corners = jnp.asarray(path_of(loop).waypoints)
+    at, change = ((jnp.arange(steps)[:, None] + GAUSS) / steps).reshape(-1), jnp.diff(corners, axis=0)
+    theta = corners[:-1, None] + at[None, :, None] * change[:, None]
+    return theta.reshape(-1, 3), jnp.repeat(change / steps, len(at), axis=0)
+
+
+def traced_product(omega: jax.Array) -> jax.Array:
+    """Same as `product`, in JAX."""
+    turns = jax.vmap(_turn)(omega.reshape(-1, NODES, 3))
+    return jax.lax.scan(lambda done, turn: (done @ so3.exp(turn), None), jnp.eye(3, dtype=omega.dtype), turns)[0]
 
 
 def _turn(w: jax.Array) -> jax.Array:
     return (w[0] + w[1]) / 2 + 3**0.5 / 12 * jnp.cross(w[0], w[1])
 
 
-def fewest_steps(reference: Reference, error: Callable[[np.ndarray], float]) -> int:
-    """Return the fewest steps an edge that this method needs, for the plain equations of `reojax.momentum`."""
+def plain_error(reference: Reference) -> Callable[[int], float]:
+    """Return the error of this method with the plain equations of `reojax.momentum`, as a function of its steps."""
 
     def one(loop: Loops, steps: jax.Array) -> jax.Array:
         robot, corners = robot_of(loop), path_of(loop).waypoints
@@ -83,4 +92,9 @@ def fewest_steps(reference: Reference, error: Callable[[np.ndarray], float]) -> 
         return jax.lax.scan(edge, jnp.eye(3), (corners[:-1], jnp.diff(corners, axis=0)))[0]
 
     call, _ = compiled(jax.vmap(one, in_axes=(0, None)), reference.loops, 1)
-    return fewest(lambda steps: error(np.asarray(call(reference.loops, steps))), TOLERANCE, start=8)
+    return lambda steps: reference.error(np.asarray(call(reference.loops, steps)))
+
+
+def fewest_steps(reference: Reference) -> int:
+    """Return the fewest steps an edge with which this method reaches the tolerance."""
+    return fewest(plain_error(reference), TOLERANCE, start=8)

@@ -29,18 +29,19 @@ def measure(calls: Sequence[Callable[[], Any]], seconds: float) -> list[Samples]
     """
     repeats = []
     for call in calls:
-        _run(call, 1)
-        once, _ = _run(call, 1)
+        timed(call)
+        once, _ = timed(call)
         repeats.append(max(1, round(SAMPLE / max(once, 1e-7))))
     taken = np.zeros((0, len(calls), 2))
     while len(taken) < 3 or (taken[:, :, 0].sum() < seconds * len(calls)):
-        sample = [_run(call, count) for call, count in zip(calls, repeats, strict=True)]
+        sample = [timed(call, count) for call, count in zip(calls, repeats, strict=True)]
         taken = np.concatenate([taken, [sample]])
     each = taken / np.array(repeats)[None, :, None]
     return [Samples(*each[:, i].T) for i in range(len(calls))]
 
 
-def _run(call: Callable[[], Any], count: int) -> tuple[float, float]:
+def timed(call: Callable[[], Any], count: int = 1) -> tuple[float, float]:
+    """Wall and processor time of `count` calls [s]."""
     wall, cpu = time.perf_counter(), time.process_time()
     for _ in range(count):
         jax.block_until_ready(call())
@@ -48,7 +49,7 @@ def _run(call: Callable[[], Any], count: int) -> tuple[float, float]:
 
 
 def compiled(function: Callable, *arguments: Any) -> tuple[Callable, float]:
-    """Compile for the shapes of `arguments`; return it and the seconds from the first trace on, nothing being cached."""
+    """Compile for the shapes of `arguments`; return it and the seconds from trace to program, nothing being cached."""
     jax.clear_caches()
     start = time.perf_counter()
     call = jax.jit(function).lower(*arguments).compile()

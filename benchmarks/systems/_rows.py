@@ -1,11 +1,16 @@
 """What is reported of a system."""
 
 import importlib
+from contextlib import redirect_stdout
+from io import StringIO
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ._measure import Samples
+
+GRADIENT = "with gradient"
+"""Of `what`, where the value comes with a gradient."""
 
 
 class Missing(Exception):
@@ -84,7 +89,8 @@ def optional(module: str, package: str) -> Any:
         Missing: if it is not installed, or does not work here.
     """
     try:
-        return importlib.import_module(module)
+        with redirect_stdout(StringIO()):  # MJX prints what else is not installed
+            return importlib.import_module(module)
     except Exception as error:  # a peer built for another version may fail in any way
         absent = isinstance(error, ModuleNotFoundError) and error.name == module.split(".")[0]
         reason = f"not installed: pip install {package}" if absent else f"{type(error).__name__}: {error}"

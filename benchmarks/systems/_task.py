@@ -15,6 +15,7 @@ import numpy as np
 import reojax
 from reojax import Robot
 from reojax.robots import prototype, with_end_inertia, with_gear_ratio
+
 from ._measure import compiled
 
 LOWER = np.array([np.deg2rad(60), np.deg2rad(30), 10e-6, 1.0])
@@ -64,7 +65,7 @@ def path_of(loop: Loops) -> reojax.Path:
     return reojax.manoeuvre_a(loop.twist, loop.bend)
 
 
-def net_rotation(loop: Loops, steps: int) -> jax.Array:
+def net_rotation(loop: Loops, steps: int) -> Any:
     """Return the net rotation (3, 3) after one loop, by reojax."""
     return reojax.net_rotation(robot_of(loop), path_of(loop), steps=steps)
 
@@ -89,8 +90,8 @@ class Task(NamedTuple):
     reference: "Reference"
 
     def error(self, rotations: np.ndarray) -> float:
-        """95th percentile of the angle between `rotations` (m, 3, 3) of the first loops and the reference [rad]."""
-        return float(np.quantile(angles(rotations, self.reference.rotation[: len(rotations)]), 0.95))
+        """Error of the `rotations` (m, 3, 3) of the first loops, see `Reference.error`."""
+        return self.reference.error(rotations)
 
     def gradient_error(self, gradients: np.ndarray, variables: Sequence[str] = Loops._fields) -> float:
         """95th percentile of the error of the gradients of the first loops, over the median size of a gradient.
@@ -116,6 +117,10 @@ class Reference:
         """(m, 3, 3) net rotations."""
         call, _ = compiled(jax.vmap(lambda loop: net_rotation(loop, REFERENCE_STEPS)), self.loops)
         return np.asarray(call(self.loops))
+
+    def error(self, rotations: np.ndarray) -> float:
+        """95th percentile of the angle between `rotations` (m, 3, 3) of the first loops and these [rad]."""
+        return float(np.quantile(angles(rotations, self.rotation[: len(rotations)]), 0.95))
 
     @cached_property
     def gradient(self) -> np.ndarray:

@@ -1,10 +1,11 @@
-"""adam: the centroidal momentum matrix at every node, under vmap, fourth-order Magnus method.
+"""adam: the mass matrix at every node, in batches of its own (under `vmap` it fails), fourth-order Magnus method.
 
 adam makes its models of text, so the end links keep the inertia of the thesis here, and the error is counted against
 reojax with the same; the other three variables are those of the task.
 """
 
 from collections.abc import Iterator
+from functools import partial
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import jax
@@ -15,12 +16,13 @@ from reojax import Robot
 from reojax.robots import prototype
 from reojax.robots.prototype import END_INERTIA
 
-from . import _magnus, _under_vmap
+from . import _jax_rows, _magnus
 from ._foreign import omega_from_base_rows, oracles
 from ._rows import Row, optional
-from ._task import Loops, Reference, Task
+from ._task import Loops, Reference, Task, objective
 
 PACKAGE = "adam-robotics, without its extra `jax` (that one goes back to JAX 0.6.0)"
+VARIABLES = ("twist", "bend", "ratio")
 
 
 def rows(task: Task) -> Iterator[Row]:
@@ -35,23 +37,32 @@ def rows(task: Task) -> Iterator[Row]:
     for index, rotor in enumerate(rotors):
         turns[index, rotor.joint] = np.sign(rotor.spin)
 
-    def rotation(loop: Loops) -> jax.Array:
-        drive = jnp.concatenate([jnp.eye(3), loop.ratio * turns])
+    def rotations(loops: Loops) -> jax.Array:
+        theta, rate = jax.vmap(partial(_magnus.traced_nodes, steps=task.magnus_steps))(loops)
+        drive = jnp.concatenate(jnp.broadcast_arrays(jnp.eye(3), loops.ratio[:, None, None] * turns), axis=1)
+        q, velocity = (jnp.einsum("nhj,nij->nih", drive, x) for x in (theta, rate))
+        base = jnp.broadcast_to(jnp.eye(4), (*q.shape[:2], 4, 4)).reshape(-1, 4, 4)
+        mass = computations.mass_matrix(base, q.reshape(-1, q.shape[-1])).reshape(*q.shape[:2], 12, 12)
+        push = jnp.einsum("niab,nib->nia", mass[:, :, :6, 6:], velocity)
+        return jax.vmap(_magnus.traced_product)(jax.vmap(jax.vmap(omega_from_base_rows))(mass[:, :, :6, :6], push))
 
-        def omega(theta: jax.Array, rate: jax.Array) -> jax.Array:
-            mass = computations.mass_matrix(jnp.eye(4), drive @ theta)
-            return omega_from_base_rows(mass[:6, :6], mass[:6, 6:] @ (drive @ rate))
+    def gradients(loops: Loops) -> tuple[jax.Array, list[jax.Array]]:
+        def number(moving: list[jax.Array]) -> tuple[jax.Array, jax.Array]:
+            values = objective(rotations(loops._replace(**dict(zip(VARIABLES, moving, strict=True)))))
+            return values.sum(), values  # each loop's gradient is its own: the loops are independent
 
-        return _magnus.rotation(omega, loop, task.magnus_steps)
+        slope, values = jax.grad(number, has_aux=True)([getattr(loops, name) for name in VARIABLES])
+        return values, slope
 
-    yield from _under_vmap.rows(
+    yield from _jax_rows.rows(
         task,
         "adam",
-        rotation,
+        rotations,
+        gradients,
         loops=8 if task.quick else 64,
         steps=task.magnus_steps,
         evaluations=_magnus.evaluations(task.magnus_steps),
-        variables=("twist", "bend", "ratio"),
+        variables=VARIABLES,
         note="end links of the thesis in all loops: adam's models are made of text",
     )
 

@@ -22,7 +22,7 @@ from reojax.robots.prototype import END_INERTIA
 from . import _magnus
 from ._c import build, pointer
 from ._measure import CORES, measure
-from ._rows import Row, optional, row
+from ._rows import GRADIENT, Row, optional, row
 from ._task import WEIGHTS, Task
 
 FLAGS = ("-O2", "-march=native")  # gcc 12 at -O3 has been seen to get such gradients wrong
@@ -41,7 +41,7 @@ def rows(task: Task) -> Iterator[Row]:
     checked = inputs[: task.checked]
     error = task.error(np.asarray(jax.vmap(so3.from_quaternion)(call(checked))))
     gradient_error = task.gradient_error(slope_call(checked)[:, 1:])
-    shared = dict(
+    shared: dict[str, Any] = dict(
         loops=len(inputs),
         steps=task.magnus_steps,
         evaluations=_magnus.evaluations(task.magnus_steps),
@@ -56,7 +56,7 @@ def rows(task: Task) -> Iterator[Row]:
             yield row("CasADi to C", "value", timed[0], compile=write + seconds, **shared)
             yield row(
                 "CasADi to C",
-                "value and gradient, 4 variables",
+                f"{GRADIENT}, 4 variables",
                 timed[1],
                 gradient_error=gradient_error,
                 compile=write + slope_seconds,
@@ -132,7 +132,7 @@ def _omega(ca: Any, theta: Any, rate: Any, end_inertia: Any, ratio: Any) -> Any:
     return -(adjugate @ L) / (xx * a + xy * b + xz * c)
 
 
-def _known(ca: Any, array: np.ndarray) -> Any:
+def _known(ca: Any, array: Any) -> Any:
     return ca.SX(ca.sparsify(ca.DM(np.asarray(array))))
 
 
@@ -140,7 +140,7 @@ def _cross(ca: Any, a: Any, b: Any) -> Any:
     return ca.vertcat(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-def _rotation(ca: Any, axis: np.ndarray, angle: Any) -> Any:
+def _rotation(ca: Any, axis: Any, angle: Any) -> Any:
     along = np.outer(axis, axis)
     across = ca.sparsify(ca.skew(ca.DM(axis)))
     return _known(ca, np.eye(3) - along) * ca.cos(angle) + across * ca.sin(angle) + _known(ca, along)

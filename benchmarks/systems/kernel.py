@@ -1,10 +1,11 @@
 """A kernel in C, written by hand for SIMD: `benchmarks/kernel.c`."""
 
-import ctypes
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
+import jax
 import numpy as np
 
 from reojax import Robot, so3
@@ -19,6 +20,7 @@ from ._task import Loops, Task
 
 SOURCE = Path(__file__).resolve().parents[1] / "kernel.c"
 FLAGS = ("-O3", "-march=native", "-fopenmp-simd")
+LANES = 8  # of kernel.c
 FORMS = {"net_rotation": "any axes", "net_rotation_prototype": "this robot only"}
 
 
@@ -27,10 +29,10 @@ def rows(task: Task) -> Iterator[Row]:
     library, seconds = build(SOURCE.read_text(), FLAGS)
     for function, form in FORMS.items():
         single, loops = _caller(getattr(library, function), task), len(task.loops.twist)
+        threads = sorted({1, CORES})
         with ThreadPoolExecutor(CORES) as pool:
-            calls = [lambda: single(task.loops), lambda: _in_parts(pool, single, task.loops)]
-            threads = (1, CORES)[: 1 if CORES == 1 else 2]
-            for count, samples in zip(threads, measure(calls[: len(threads)], task.seconds), strict=True):
+            calls = [partial(_in_parts, pool, single, task.loops, count) for count in threads]
+            for count, samples in zip(threads, measure(calls, task.seconds), strict=True):
                 yield row(
                     f"C by hand, SIMD, {form}",
                     "value",
@@ -56,16 +58,16 @@ def _caller(function: Callable, task: Task) -> Callable[[Loops], np.ndarray]:
     return call
 
 
-def _in_parts(pool: ThreadPoolExecutor, call: Callable[[Loops], np.ndarray], loops: Loops) -> list[np.ndarray]:
-    size = len(loops.twist) // CORES // 8 * 8
-    starts = [i * size for i in range(CORES)] + [len(loops.twist)]
+def _in_parts(
+    pool: ThreadPoolExecutor, call: Callable[[Loops], np.ndarray], loops: Loops, count: int
+) -> list[np.ndarray]:
+    size = len(loops.twist) // count // LANES * LANES
+    starts = [i * size for i in range(count)] + [len(loops.twist)]
     parts = [Loops(*(field[a:b] for field in loops)) for a, b in zip(starts, starts[1:], strict=False)]
     return list(pool.map(call, parts))
 
 
 def _rotations(quaternion: np.ndarray) -> np.ndarray:
-    import jax
-
     return np.asarray(jax.vmap(so3.from_quaternion)(quaternion.T))
 
 

@@ -1,6 +1,7 @@
 """reojax, through its public functions under `jax.jit(jax.vmap(...))`."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -10,9 +11,9 @@ import reojax
 from reojax import Robot
 from reojax.holonomy import DEFAULT_STEPS
 
-from . import _under_vmap
+from . import _jax_rows
 from ._measure import CORES, compiled, fewest, measure
-from ._rows import Row, row
+from ._rows import GRADIENT, Row, row
 from ._task import TOLERANCE, Task, net_rotation, objective, robot_of
 
 NODES = 6
@@ -43,15 +44,15 @@ def _steps(task: Task) -> list[int]:
     return [fewest(error, TOLERANCE), DEFAULT_STEPS]
 
 
-def _name(steps: int) -> str:
-    return "at its default steps" if steps == DEFAULT_STEPS else "at the tolerance"
+def _name(dtype: type, steps: int) -> str:
+    return f"reojax {np.dtype(dtype).name}, " + ("default" if steps == DEFAULT_STEPS else f"{TOLERANCE:.0e} rad")
 
 
 def _four_variables(task: Task, steps: int, dtype: type) -> Iterator[Row]:
-    yield from _under_vmap.rows(
+    yield from _jax_rows.rows(
         task,
-        f"reojax, {np.dtype(dtype).name}, {_name(steps)}",
-        lambda loop: net_rotation(loop, steps),
+        _name(dtype, steps),
+        *_jax_rows.under_vmap(lambda loop: net_rotation(loop, steps)),
         loops=len(task.loops.twist),
         steps=steps,
         evaluations=4 * NODES * steps,
@@ -61,11 +62,11 @@ def _four_variables(task: Task, steps: int, dtype: type) -> Iterator[Row]:
 
 def _every_array(task: Task, steps: int) -> Iterator[Row]:
     """Rows with every array of the robot given loop by loop, and differentiated, with both amplitudes."""
-    loops, system = task.loops, f"reojax, float64, {_name(steps)}"
+    loops, system = task.loops, _name(np.float64, steps)
     robots = jax.jit(jax.vmap(lambda loop: jax.tree.map(jnp.asarray, robot_of(loop))))(loops)
     batch = robots, loops.twist, loops.bend
 
-    def rotation(robot: Robot, twist: jax.Array, bend: jax.Array) -> jax.Array:
+    def rotation(robot: Robot, twist: jax.Array, bend: jax.Array) -> Any:
         return reojax.net_rotation(robot, reojax.manoeuvre_a(twist, bend), steps=steps)
 
     def number(*design) -> jax.Array:
@@ -74,7 +75,7 @@ def _every_array(task: Task, steps: int) -> Iterator[Row]:
     value, value_compile = compiled(jax.vmap(rotation), *batch)
     gradient, gradient_compile = compiled(jax.vmap(jax.value_and_grad(number, argnums=(0, 1, 2))), *batch)
     timed = measure([lambda: value(*batch), lambda: gradient(*batch)], task.seconds)
-    shared = dict(
+    shared: dict[str, Any] = dict(
         loops=len(loops.twist),
         threads=CORES,
         steps=steps,
@@ -87,7 +88,7 @@ def _every_array(task: Task, steps: int) -> Iterator[Row]:
     slopes = np.stack([by_twist, by_bend, chained.inertia, chained.ratio], axis=1)[: task.checked]
     yield row(
         system,
-        "value and gradient, every array",
+        f"{GRADIENT}, every array",
         timed[1],
         gradient_error=task.gradient_error(slopes),
         compile=gradient_compile,

@@ -14,7 +14,7 @@ import numpy as np
 from reojax import so3
 from reojax.robots import prototype
 
-from . import _magnus, _under_vmap
+from . import _jax_rows, _magnus
 from ._foreign import omega_from_base_rows, oracles
 from ._rows import Row, optional
 from ._task import Loops, Task, robot_of
@@ -41,14 +41,13 @@ def rows(task: Task) -> Iterator[Row]:
 
         return _magnus.rotation(omega, loop, task.magnus_steps)
 
-    yield from _under_vmap.rows(
+    yield from _jax_rows.rows(
         task,
         "MJX",
-        rotation,
+        *_jax_rows.under_vmap(rotation, forward=True),
         loops=8 if task.quick else 64,
         steps=task.magnus_steps,
         evaluations=_magnus.evaluations(task.magnus_steps),
-        forward=True,
     )
 
 

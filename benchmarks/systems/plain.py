@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import reojax
 
-from . import _magnus, _under_vmap
+from . import _jax_rows, _magnus
 from ._rows import Row
 from ._task import Task, robot_of
 
@@ -16,10 +16,10 @@ def rows(task: Task) -> Iterator[Row]:
         robot = robot_of(loop)
         return _magnus.rotation(lambda theta, rate: reojax.connection(robot, theta) @ rate, loop, steps)
 
-    yield from _under_vmap.rows(
+    yield from _jax_rows.rows(
         task,
         "plain equations of reojax.momentum",
-        rotation,
+        *_jax_rows.under_vmap(rotation),
         loops=64 if task.quick else 256,
         steps=task.magnus_steps,
         evaluations=_magnus.evaluations(task.magnus_steps),

@@ -1,0 +1,95 @@
+"""What both commands have in common: options, settings, errors, and a description of the machine."""
+
+import argparse
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import jax
+from systems._measure import CORES
+
+PACKAGES = (
+    *("jax", "jaxlib", "numpy", "scipy", "pin", "mujoco", "mujoco-mjx", "casadi"),
+    *("adam-robotics", "diffrax", "equinox"),
+)
+
+
+def options(doc: str | None) -> argparse.ArgumentParser:
+    """Parser with the options that both commands have; `doc` is the command's docstring."""
+    summary, _, rest = (doc or "").partition("\n")
+    parser = argparse.ArgumentParser(
+        description=summary, epilog=rest, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="smaller and noisier, for trying out")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for results (default: out)")
+    return parser
+
+
+def run(main: Callable[..., None], parser: argparse.ArgumentParser) -> None:
+    """Call `main` with the options, float64 on and no compilation cache; exit 2 on bad input."""
+    arguments = vars(parser.parse_args())
+    jax.config.update("jax_enable_x64", True)
+    jax.config.update("jax_enable_compilation_cache", False)
+    try:
+        out = arguments["out"]
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ValueError(f"cannot make the folder {str(out)!r}: {error.strerror}.") from error
+        main(**arguments)
+    except ValueError as error:
+        parser.exit(2, f"{parser.prog}: {error}\n")
+    except KeyboardInterrupt:
+        parser.exit(130, f"{parser.prog}: stopped\n")
+
+
+def machine() -> dict[str, Any]:
+    """Processor, cores, load, and versions of everything."""
+    return {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "processor": _processor(),
+        "cores": CORES,
+        "load": list(os.getloadavg()) if hasattr(os, "getloadavg") else None,
+        "system": platform.platform(),
+        "jax devices": [str(device) for device in jax.devices()],
+        "versions": {
+            "python": platform.python_version(),
+            "gcc": _gcc(),
+            "reojax": _version("reojax") or "not installed, from its folder",
+            **{package: _version(package) for package in PACKAGES},
+        },
+    }
+
+
+def _processor() -> str:
+    information = Path("/proc/cpuinfo")
+    if information.exists():
+        for line in information.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _gcc() -> str | None:
+    if not shutil.which("gcc"):
+        return None
+    return subprocess.run(["gcc", "-dumpfullversion"], capture_output=True, text=True).stdout.strip()
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def say(text: str) -> None:
+    """Tell the user how it goes, apart from the results."""
+    print(text, file=sys.stderr, flush=True)
