@@ -62,13 +62,13 @@ def _end_rotation_jvp(steps, pattern, primals, tangents):
     velocity = scale(-1, plus(base.drift, cross(omega, base.centre)))
     leaves, structure = jax.tree.flatten((robot, points))
     changes = jax.tree.leaves(tangents, is_leaf=lambda t: isinstance(t, SymbolicZero))
-    moving = [i for i, change in enumerate(changes) if not isinstance(change, SymbolicZero)]
-    if not moving:
+    varied = [i for i, change in enumerate(changes) if not isinstance(change, SymbolicZero)]
+    if not varied:
         return rotation, jnp.zeros_like(rotation)
 
     def momentum(values):
         now = list(leaves)
-        for i, value in zip(moving, values, strict=True):
+        for i, value in zip(varied, values, strict=True):
             now[i] = value
         robot, points = jax.tree.unflatten(structure, now)
         theta, rate = path_nodes(points, steps)
@@ -76,7 +76,7 @@ def _end_rotation_jvp(steps, pattern, primals, tangents):
         of_all = angular_momentum(parts, [sincos(a) for a in theta], rate, omega, velocity, base.centre, keep)
         return _at_nodes(of_all, theta[0])
 
-    _, change = jax.jvp(momentum, ([leaves[i] for i in moving],), ([changes[i] for i in moving],))
+    _, change = jax.jvp(momentum, ([leaves[i] for i in varied],), ([changes[i] for i in varied],))
     change_of_omega = _at_nodes(solve(base.inertia, scale(-1, change)), theta[0])
     in_step = mean_over_step(step.inside(keep(change_of_omega), keep))
     x, y, z = (c.sum() for c in rotate(times(before, step.half), in_step))
