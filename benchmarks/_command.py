@@ -35,8 +35,7 @@ def options(doc: str | None) -> argparse.ArgumentParser:
 def run(main: Callable[..., None], parser: argparse.ArgumentParser) -> None:
     """Call `main` with the options, float64 on and no compilation cache; exit 2 on bad input."""
     arguments = vars(parser.parse_args())
-    jax.config.update("jax_enable_x64", True)
-    jax.config.update("jax_enable_compilation_cache", False)
+    settings()
     try:
         out = arguments["out"]
         try:
@@ -48,6 +47,12 @@ def run(main: Callable[..., None], parser: argparse.ArgumentParser) -> None:
         parser.exit(2, f"{parser.prog}: {error}\n")
     except KeyboardInterrupt:
         parser.exit(130, f"{parser.prog}: stopped\n")
+
+
+def settings() -> None:
+    """Switch float64 on, and the compilation cache off."""
+    jax.config.update("jax_enable_x64", True)
+    jax.config.update("jax_enable_compilation_cache", False)
 
 
 def machine() -> dict[str, Any]:

@@ -13,17 +13,19 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from _apart import apart
 from _command import machine, options, run, say
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from systems._foreign import from_tests
-from systems._magnus import NODES as MAGNUS_NODES, plain_error
+from systems._magnus import GAUSS, plain_error
 from systems._measure import compiled, measure, timed
 from systems._task import Loops, Reference, net_rotation, objective, random_loops
 from tqdm import tqdm
 
 import reojax
 from reojax import robots
+from reojax._fast.nodes import NODES
 from reojax._output import check_writable, replacing, write_json
 from reojax.holonomy import DEFAULT_STEPS
 
@@ -32,10 +34,10 @@ JOINTS = (2, 4, 8, 16)
 CORNERS = (4, 16, 64, 250, 1000, 4000)
 STEPS = tuple(range(1, 11))
 MAGNUS_STEPS = (1, 2, 4, 8, 16, 32, 64, 128)
-NODES = 6
-"""Evaluations of omega in a step of reojax."""
-LONG = 300_000
+LONG = 100_000
 """From so many designs on, one run says enough."""
+MEMORY = 12 * 2.0**30
+"""Bytes for each number of joints."""
 VALUE, GRADIENT, ALL = "value", "with gradient", "with gradient, every array"
 COLOURS = {VALUE: "#0072b2", GRADIENT: "#d55e00", ALL: "#7f3c8d"}
 
@@ -54,16 +56,17 @@ def main(out: Path, *, quick: bool) -> None:
     """Measure, write the numbers, draw the picture."""
     result, picture = check_writable(out / "scaling.json"), check_writable(out / "scaling.png")
     before, seconds = machine(), 0.3 if quick else 1.5
+    missing: dict[str, str] = {}
     panels = {
         "designs": _progress("designs", _designs(quick, seconds)),
-        "joints": _progress("joints", _joints(quick, seconds)),
+        "joints": _progress("joints", _joints(quick, seconds, missing)),
         "corners": _progress("corners", _corners(seconds)),
     }
     accuracy = _accuracy(64 if quick else 512)
     with replacing(picture) as file:
-        _figure(panels, accuracy).savefig(file, dpi=140, format="png")
+        _figure(panels, accuracy, missing).savefig(file, dpi=140, format="png")
     numbers = {name: [point._asdict() for point in points] for name, points in panels.items()}
-    about = {"quick": quick, "machine": {**before, "load after": machine()["load"]}}
+    about = {"quick": quick, "missing": missing, "machine": {**before, "load after": machine()["load"]}}
     write_json(result, {**about, **numbers, "accuracy": accuracy})
     say(f"wrote {result} and {picture}")
 
@@ -105,26 +108,28 @@ def _designs(quick: bool, seconds: float) -> Iterator[Point]:
             yield _point(f"{series}, batches of {BATCH}", size, size, everything, seconds, took)
 
 
-def _joints(quick: bool, seconds: float) -> Iterator[Point]:
-    """Random serial robots on random loops of four edges."""
+def _joints(quick: bool, seconds: float, missing: dict[str, str]) -> Iterator[Point]:
+    """Random serial robots on random loops of four edges, each in a process of its own; gaps go to `missing`."""
     for joints in JOINTS:
-        robot = from_tests("random_robots").random_robot(7, joints)
-        points = np.random.default_rng(7).uniform(-1.5, 1.5, (256, 5, joints))
-        points[:, -1] = points[:, 0]
-
-        def rotation(points, robot=robot) -> Any:
-            return reojax.net_rotation(robot, reojax.Path(points))
-
-        series = {VALUE: rotation, GRADIENT: _with_gradient(rotation)}
-        if not quick:
-            series[ALL] = lambda points, robot=robot: _with_gradient(_on_robot, (0, 1))(points, robot)
-        for name, function in series.items():
-            call, took = compiled(jax.vmap(function), points)
-            yield _point(name, joints, len(points), lambda call=call, points=points: call(points), seconds, took)
+        for series in (VALUE, GRADIENT) if quick else (VALUE, GRADIENT, ALL):
+            try:
+                yield from apart(_of_joints, joints, series, seconds, patience=30 if quick else 120, memory=MEMORY)
+            except (TimeoutError, MemoryError) as error:
+                missing[f"{series}, {joints} joints"] = str(error)
 
 
-def _on_robot(points: Any, robot: reojax.Robot) -> Any:
-    return reojax.net_rotation(robot, reojax.Path(points))
+def _of_joints(joints: int, series: str, seconds: float) -> Iterator[Point]:
+    robot = from_tests("random_robots").random_robot(7, joints)
+    points = np.random.default_rng(7).uniform(-1.5, 1.5, (256, 5, joints))
+    points[:, -1] = points[:, 0]
+
+    def rotation(points: Any, robot: reojax.Robot = robot) -> Any:
+        return reojax.net_rotation(robot, reojax.Path(points))
+
+    every_array = lambda points: _with_gradient(rotation, (0, 1))(points, robot)
+    function = {VALUE: rotation, GRADIENT: _with_gradient(rotation), ALL: every_array}[series]
+    call, took = compiled(jax.vmap(function), points)
+    yield _point(series, joints, len(points), lambda: call(points), seconds, took)
 
 
 def _corners(seconds: float) -> Iterator[Point]:
@@ -162,18 +167,20 @@ def _accuracy(loops: int) -> dict[str, list]:
 
     classic = plain_error(reference)
     return {
-        "reojax": [(NODES * steps, error(steps)) for steps in tqdm(STEPS, desc="accuracy", unit="step")],
-        "Magnus 4": [(MAGNUS_NODES * steps, classic(steps)) for steps in MAGNUS_STEPS],
+        "reojax": [(len(NODES) * steps, error(steps)) for steps in tqdm(STEPS, desc="accuracy", unit="step")],
+        "Magnus 4": [(len(GAUSS) * steps, classic(steps)) for steps in MAGNUS_STEPS],
     }
 
 
-def _figure(panels: dict[str, list[Point]], accuracy: dict[str, list]) -> Figure:
+def _figure(panels: dict[str, list[Point]], accuracy: dict[str, list], missing: dict[str, str]) -> Figure:
     figure = Figure(figsize=(11, 8.6), layout="constrained", facecolor="white")
     designs, joints, corners, errors = figure.subplots(2, 2).ravel()
     _draw_designs(designs, panels["designs"])
     _draw_joints(joints, panels["joints"])
     _draw_corners(corners, panels["corners"])
     _draw_accuracy(errors, accuracy)
+    if missing:
+        joints.text(0.02, 0.02, "not measured: " + ", ".join(missing), transform=joints.transAxes, fontsize=9)
     for axes in (designs, joints, corners, errors):
         axes.set_xscale("log")
         axes.set_yscale("log")
@@ -197,9 +204,11 @@ def _draw_designs(axes: Axes, points: Sequence[Point]) -> None:
 
 
 def _draw_joints(axes: Axes, points: Sequence[Point]) -> None:
-    base = JOINTS.index(4)
     for name, line in _by_series(points).items():
         sizes = [p.size for p in line]
+        if 4 not in sizes:
+            continue
+        base = sizes.index(4)
         run, compile = ([getattr(p, field) or np.nan for p in line] for field in ("cpu", "compile"))
         for times, style, label in (
             (run, "o-", f"{name}: {run[base] * 1e6:.3g} us"),
@@ -228,7 +237,7 @@ def _draw_corners(axes: Axes, points: Sequence[Point]) -> None:
 def _draw_accuracy(axes: Axes, accuracy: dict[str, list]) -> None:
     for (name, line), colour, style in zip(accuracy.items(), ("#0072b2", "#999999"), ("o-", "s:"), strict=True):
         axes.plot(*zip(*line, strict=True), style, color=colour, label=name)
-    default = next(point for point in accuracy["reojax"] if point[0] == NODES * DEFAULT_STEPS)
+    default = next(point for point in accuracy["reojax"] if point[0] == len(NODES) * DEFAULT_STEPS)
     axes.annotate("default", default, (8, 8), textcoords="offset points")
     axes.set(
         title="Accuracy: prototype, manoeuvres up to 270/120 degrees",

@@ -9,15 +9,13 @@ import numpy as np
 
 import reojax
 from reojax import Robot
+from reojax._fast.nodes import NODES
 from reojax.holonomy import DEFAULT_STEPS
 
 from . import _jax_rows
 from ._measure import CORES, compiled, fewest, measure
 from ._rows import GRADIENT, Row, row
 from ._task import TOLERANCE, Task, net_rotation, objective, robot_of
-
-NODES = 6
-"""Evaluations of omega in a step."""
 
 
 def float64(task: Task) -> Iterator[Row]:
@@ -55,7 +53,7 @@ def _four_variables(task: Task, steps: int, dtype: type) -> Iterator[Row]:
         *_jax_rows.under_vmap(lambda loop: net_rotation(loop, steps)),
         loops=len(task.loops.twist),
         steps=steps,
-        evaluations=4 * NODES * steps,
+        evaluations=4 * len(NODES) * steps,
         dtype=dtype,
     )
 
@@ -79,7 +77,7 @@ def _every_array(task: Task, steps: int) -> Iterator[Row]:
         loops=len(loops.twist),
         threads=CORES,
         steps=steps,
-        evaluations=4 * NODES * steps,
+        evaluations=4 * len(NODES) * steps,
         error=task.error(np.asarray(value(*batch))[: task.checked]),
     )
     yield row(system, "value, every array given", timed[0], compile=value_compile, **shared)
