@@ -25,3 +25,21 @@ def common_float(*trees: Any) -> np.dtype:
 def is_concrete(value: Any) -> bool:
     """Tell whether the numbers of `value` can be read now (False while JAX is tracing it)."""
     return not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(value))
+
+
+def as_numbers(entry: str, value: Any) -> Array:
+    """Return `value` as an array of real numbers (integers become floats), traced or not.
+
+    Raises:
+        ValueError: naming `entry`, if it is anything else.
+    """
+    on_device = any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value))
+    try:
+        array = jnp.asarray(value) if on_device else np.asarray(value)
+    except (TypeError, ValueError) as error:  # a ragged list, or no numbers
+        raise ValueError(f"`{entry}` is {value!r}; only real numbers will do.") from error
+    if jnp.issubdtype(array.dtype, jnp.integer):
+        array = array.astype(float)
+    if not jnp.issubdtype(array.dtype, jnp.floating):
+        raise ValueError(f"`{entry}` is {value!r}; only real numbers will do.")
+    return array

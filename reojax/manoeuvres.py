@@ -9,11 +9,10 @@ from collections.abc import Sequence
 from math import pi
 from typing import NamedTuple
 
-import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reojax._arrays import is_concrete
+from reojax._arrays import Array, as_numbers, is_concrete
 from reojax.path import Path, polygon
 
 
@@ -89,14 +88,9 @@ def _shape(layout: Layout, angles: dict[int, float]) -> np.ndarray:
     return shape
 
 
-def _amplitude(entry: str, value: ArrayLike) -> jax.Array | np.ndarray:
-    try:
-        number = value if isinstance(value, jax.Array) else np.asarray(value)
-    except ValueError as error:  # a ragged list
-        raise ValueError(f"`{entry}` is {value!r}; it must be one real number, in radians.") from error
-    if np.issubdtype(number.dtype, np.integer):
-        number = number.astype(float)
-    if number.shape or not np.issubdtype(number.dtype, np.floating):
+def _amplitude(entry: str, value: ArrayLike) -> Array:
+    number = as_numbers(entry, value)
+    if number.shape:
         raise ValueError(f"`{entry}` is {value!r}; it must be one real number, in radians.")
     if is_concrete(number) and not np.isfinite(number):
         raise ValueError(f"`{entry}` is {value}; it must be finite.")

@@ -22,7 +22,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from reojax._arrays import Array, common_float, is_concrete
+from reojax._arrays import Array, as_numbers, common_float, is_concrete
 from reojax._smallmat import solve_symmetric3
 from reojax.robot import Robot
 from reojax.so3 import hat
@@ -54,21 +54,21 @@ class MomentumMatrices(NamedTuple):
     """Minus the momentum that unit joint rates give while the base does not turn."""
 
 
-def _as_arrays(robot: Robot, *motion: Array) -> Any:
-    dtype = common_float(robot, motion)
-    return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), (robot, *motion))
-
-
-def _check(robot: Robot, **motion: Array) -> None:
+def _checked(robot: Robot, **motion: Any) -> Any:
+    """Return the robot and the motion's vectors as arrays of one dtype, or raise a `ValueError`."""
     if not isinstance(robot, Robot):
         raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
     for entry, value in motion.items():
         expected = (3,) if entry == "omega" else (robot.joints,)
-        if jnp.shape(value) != expected:
+        vector = motion[entry] = as_numbers(entry, value)
+        if vector.shape != expected:
             robot_size = f"{robot.name!r} ({robot.joints} joints)"
-            raise ValueError(f"`{entry}` has shape {jnp.shape(value)}; for {robot_size} it must be {expected}.")
-        if is_concrete(value) and not np.isfinite(value).all():
-            raise ValueError(f"`{entry}` is {np.asarray(value).tolist()}; it must be finite.")
+            raise ValueError(f"`{entry}` has shape {vector.shape}; for {robot_size} it must be {expected}.")
+        if is_concrete(vector) and not np.isfinite(vector).all():
+            raise ValueError(f"`{entry}` is {np.asarray(vector).tolist()}; it must be finite.")
+    everything = (robot, *motion.values())
+    dtype = common_float(everything)
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), everything)
 
 
 def joint_rotation(axis: Float[Array, "3"], angle: Float[Array, ""]) -> Float[Array, "3 3"]:
@@ -83,8 +83,7 @@ def kinematics(robot: Robot, theta: Float[Array, " j"]) -> Kinematics:
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
-    _check(robot, theta=theta)
-    robot, theta = _as_arrays(robot, theta)
+    robot, theta = _checked(robot, theta=theta)
     zero = jnp.zeros((3, robot.joints), theta.dtype)
     rotation, origin, axis = [jnp.eye(3, dtype=theta.dtype)], [zero[:, :0].sum(1)], []
     turn, shift = [zero], [zero]  # `shift` of the link's origin, base at rest
@@ -123,8 +122,8 @@ def momentum_matrices(robot: Robot, theta: Float[Array, " j"]) -> MomentumMatric
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
+    robot, theta = _checked(robot, theta=theta)
     pose = kinematics(robot, theta)
-    robot, theta = _as_arrays(robot, theta)
     A = jnp.zeros((3, 3), theta.dtype)
     B = jnp.zeros((3, robot.joints), theta.dtype)
     for i in range(robot.links):
@@ -164,7 +163,6 @@ def angular_momentum(
     Raises:
         ValueError: if an argument has the wrong shape or is not finite.
     """
-    _check(robot, theta=theta, theta_dot=theta_dot, omega=omega)
-    robot, theta, theta_dot, omega = _as_arrays(robot, theta, theta_dot, omega)
+    robot, theta, theta_dot, omega = _checked(robot, theta=theta, theta_dot=theta_dot, omega=omega)
     A, B = momentum_matrices(robot, theta)
     return A @ omega - B @ theta_dot

@@ -3,12 +3,11 @@
 import dataclasses
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._arrays import Array, is_concrete
+from reojax._arrays import Array, as_numbers, is_concrete
 
 
 @jax.tree_util.register_dataclass
@@ -40,17 +39,9 @@ def polygon(waypoints: ArrayLike) -> Path:
     Raises:
         ValueError: if the waypoints are not numbers, not of shape (v, j), or not finite.
     """
-    on_device = any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(waypoints))
-    try:
-        points = jnp.asarray(waypoints) if on_device else np.asarray(waypoints)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"`waypoints` must be a (v, j) array of numbers; got {waypoints!r}.") from error
+    points = as_numbers("waypoints", waypoints)
     if points.ndim != 2 or not points.shape[0]:
         raise ValueError(f"`waypoints` has shape {points.shape}; it must be (v, j) with at least one waypoint.")
-    if not (np.issubdtype(points.dtype, np.floating) or np.issubdtype(points.dtype, np.integer)):
-        raise ValueError(f"`waypoints` has dtype {points.dtype}; joint angles must be real numbers.")
-    if np.issubdtype(points.dtype, np.integer):
-        points = points.astype(float)
     if is_concrete(points) and not np.isfinite(points).all():
         row, joint = np.argwhere(~np.isfinite(np.asarray(points)))[0]
         raise ValueError(f"waypoints[{row}, {joint}] is {points[row, joint]}; joint angles must be finite.")
