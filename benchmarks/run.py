@@ -1,6 +1,6 @@
 """How fast are net rotations and their gradients, beside other people's ways to the same numbers?
 
-    python benchmarks/run.py                        # about TODO minutes on 2 quiet cores; --quick: TODO minutes
+    python benchmarks/run.py                        # about 5 minutes on 2 cores; --quick is shorter
     python benchmarks/run.py --only reojax c casadi
 
 Prints one table and writes benchmarks.json. `benchmarks/README.md` says how to read it. Systems that are not installed
@@ -69,7 +69,7 @@ def _task(quick: bool) -> tuple[Task, float | None]:
     say("reference, and steps of the fourth-order method ...")
     loops, checked = random_loops(LOOPS), 128 if quick else 512
     reference = Reference(loops, checked)
-    task = Task(loops, checked, quick, 0.3 if quick else 1.5, 0, reference)
+    task = Task(loops, checked, quick, 0.3 if quick else 2.0, 0, reference)
     check = independent_check(reference, 1 if quick else 4)
     return task._replace(magnus_steps=fewest_steps(reference)), check
 

@@ -1,6 +1,6 @@
 """How does the cost of a net rotation grow with designs, joints, corners and accuracy?
 
-    python benchmarks/scaling.py                    # about TODO minutes on 2 quiet cores; --quick: TODO minutes
+    python benchmarks/scaling.py                    # minutes on 2 quiet cores; --quick is shorter
 
 Writes scaling.json and scaling.png, one panel for each. Expected: a loop costs the same among a thousand as among
 millions, if they come in batches that fit the cache; cost grows no faster than linearly with joints, compilation
@@ -17,6 +17,7 @@ from _apart import apart
 from _command import machine, options, run, say
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 from systems._foreign import from_tests
 from systems._magnus import GAUSS, plain_error
 from systems._measure import compiled, measure, timed
@@ -175,17 +176,16 @@ def _accuracy(loops: int) -> dict[str, list]:
 def _figure(panels: dict[str, list[Point]], accuracy: dict[str, list], missing: dict[str, str]) -> Figure:
     figure = Figure(figsize=(11, 8.6), layout="constrained", facecolor="white")
     designs, joints, corners, errors = figure.subplots(2, 2).ravel()
-    _draw_designs(designs, panels["designs"])
-    _draw_joints(joints, panels["joints"])
-    _draw_corners(corners, panels["corners"])
-    _draw_accuracy(errors, accuracy)
-    if missing:
-        joints.text(0.02, 0.02, "not measured: " + ", ".join(missing), transform=joints.transAxes, fontsize=9)
     for axes in (designs, joints, corners, errors):
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.grid(which="major", color="#dddddd")
         axes.spines[["top", "right"]].set_visible(False)
+    _draw_designs(designs, panels["designs"])
+    _draw_joints(joints, panels["joints"], missing)
+    _draw_corners(corners, panels["corners"])
+    _draw_accuracy(errors, accuracy)
+    for axes in (designs, joints, corners, errors):
         axes.legend(frameon=False, fontsize=9)
     return figure
 
@@ -200,10 +200,10 @@ def _draw_designs(axes: Axes, points: Sequence[Point]) -> None:
         colour = COLOURS[name.rpartition(", ")[0]]
         axes.plot([p.size for p in line], [p.wall * 1e6 for p in line], style, color=colour, label=name)
     axes.set(title="Designs: cost of a loop", xlabel="designs", ylabel="wall time of a loop [us]")
-    axes.set_ylim(bottom=1)
+    axes.set_ylim(1, 20 * max(p.wall * 1e6 for p in points))  # with room for the legend
 
 
-def _draw_joints(axes: Axes, points: Sequence[Point]) -> None:
+def _draw_joints(axes: Axes, points: Sequence[Point], missing: dict[str, str]) -> None:
     for name, line in _by_series(points).items():
         sizes = [p.size for p in line]
         if 4 not in sizes:
@@ -211,16 +211,20 @@ def _draw_joints(axes: Axes, points: Sequence[Point]) -> None:
         base = sizes.index(4)
         run, compile = ([getattr(p, field) or np.nan for p in line] for field in ("cpu", "compile"))
         for times, style, label in (
-            (run, "o-", f"{name}: {run[base] * 1e6:.3g} us"),
-            (compile, "s:", f"{name}, compilation: {compile[base]:.2g} s"),
+            (run, "o-", f"{name} ({run[base] * 1e6:.3g} us at 4)"),
+            (compile, "s:", f"{name}, compilation ({compile[base]:.2g} s at 4)"),
         ):
             axes.plot(sizes, np.array(times) / times[base], style, color=COLOURS[name], label=label)
     axes.plot(JOINTS, np.array(JOINTS) / 4, color="#999999", linewidth=4, alpha=0.4, label="linear", zorder=0)
-    axes.set(
-        title="Joints: cost over that of 4 joints (in the legend)", xlabel="joints", ylabel="cost over that of 4 joints"
-    )
-    axes.set_xticks(JOINTS, [str(j) for j in JOINTS])
-    axes.minorticks_off()
+    axes.set(title="Joints: cost relative to 4 joints", xlabel="joints", ylabel="cost over that of 4 joints")
+    for axis, ticks in ((axes.xaxis, JOINTS), (axes.yaxis, (0.5, 1, 2, 4, 8, 16))):
+        axis.set_major_locator(FixedLocator(ticks))
+        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.set_minor_locator(NullLocator())
+    axes.set_ylim(0.2 if missing else 0.4, 64)  # with room for legend and note
+    if missing:
+        note = "not measured, see scaling.json:\n" + "\n".join(missing)
+        axes.text(0.98, 0.02, note, transform=axes.transAxes, fontsize=8, ha="right")
 
 
 def _draw_corners(axes: Axes, points: Sequence[Point]) -> None:
@@ -237,8 +241,9 @@ def _draw_corners(axes: Axes, points: Sequence[Point]) -> None:
 def _draw_accuracy(axes: Axes, accuracy: dict[str, list]) -> None:
     for (name, line), colour, style in zip(accuracy.items(), ("#0072b2", "#999999"), ("o-", "s:"), strict=True):
         axes.plot(*zip(*line, strict=True), style, color=colour, label=name)
-    default = next(point for point in accuracy["reojax"] if point[0] == len(NODES) * DEFAULT_STEPS)
-    axes.annotate("default", default, (8, 8), textcoords="offset points")
+    for point in accuracy["reojax"]:
+        if point[0] == len(NODES) * DEFAULT_STEPS:
+            axes.annotate("default", point, (8, 8), textcoords="offset points")
     axes.set(
         title="Accuracy: prototype, manoeuvres up to 270/120 degrees",
         xlabel="evaluations of omega an edge",

@@ -56,7 +56,7 @@ def rows(
         variables: what the gradients are by.
         note: of the rows.
     """
-    batch = Loops(*(field.astype(dtype) for field in task.loops.first(loops)))
+    batch = jax.device_put(Loops(*(field.astype(dtype) for field in task.loops.first(loops))))
     value, value_compile = compiled(rotations, batch)
     gradient, gradient_compile = compiled(gradients, batch)
     timed = measure([lambda: value(batch), lambda: gradient(batch)], task.seconds)

@@ -1,7 +1,7 @@
 """What every system is asked: net rotations of the prototype after manoeuvre A, with four variables a loop.
 
 The variables are both amplitudes, the inertia of the end links about their joints, and the gear ratio, drawn from the
-ranges of the thesis. Where a gradient is asked, it is that of `sum(WEIGHTS * R)`, per range of each variable.
+ranges of the thesis. Where a gradient is asked, it is that of `sum(WEIGHTS * R)`.
 """
 
 from collections.abc import Iterator, Sequence

@@ -20,18 +20,18 @@ from ._task import TOLERANCE, Task, net_rotation, objective, robot_of
 
 def float64(task: Task) -> Iterator[Row]:
     """Rows in float64."""
-    for steps in _steps(task):
-        yield from _four_variables(task, steps, np.float64)
-        yield from _every_array(task, steps)
+    for label, steps in _steps(task).items():
+        yield from _four_variables(task, f"reojax float64, {label}", steps, np.float64)
+        yield from _every_array(task, f"reojax float64, {label}", steps)
 
 
 def float32(task: Task) -> Iterator[Row]:
     """Rows in float32, with the steps of float64."""
-    for steps in _steps(task):
-        yield from _four_variables(task, steps, np.float32)
+    for label, steps in _steps(task).items():
+        yield from _four_variables(task, f"reojax float32, {label}", steps, np.float32)
 
 
-def _steps(task: Task) -> list[int]:
+def _steps(task: Task) -> dict[str, int]:
     """What the tolerance takes, and the default."""
     loops = task.reference.loops
 
@@ -39,17 +39,13 @@ def _steps(task: Task) -> list[int]:
         call, _ = compiled(jax.vmap(lambda loop: net_rotation(loop, steps)), loops)
         return task.error(np.asarray(call(loops)))
 
-    return [fewest(error, TOLERANCE), DEFAULT_STEPS]
+    return {f"{TOLERANCE:.0e} rad": fewest(error, TOLERANCE), "default": DEFAULT_STEPS}
 
 
-def _name(dtype: type, steps: int) -> str:
-    return f"reojax {np.dtype(dtype).name}, " + ("default" if steps == DEFAULT_STEPS else f"{TOLERANCE:.0e} rad")
-
-
-def _four_variables(task: Task, steps: int, dtype: type) -> Iterator[Row]:
+def _four_variables(task: Task, system: str, steps: int, dtype: type) -> Iterator[Row]:
     yield from _jax_rows.rows(
         task,
-        _name(dtype, steps),
+        system,
         *_jax_rows.under_vmap(lambda loop: net_rotation(loop, steps)),
         loops=len(task.loops.twist),
         steps=steps,
@@ -58,11 +54,11 @@ def _four_variables(task: Task, steps: int, dtype: type) -> Iterator[Row]:
     )
 
 
-def _every_array(task: Task, steps: int) -> Iterator[Row]:
+def _every_array(task: Task, system: str, steps: int) -> Iterator[Row]:
     """Rows with every array of the robot given loop by loop, and differentiated, with both amplitudes."""
-    loops, system = task.loops, _name(np.float64, steps)
+    loops = task.loops
     robots = jax.jit(jax.vmap(lambda loop: jax.tree.map(jnp.asarray, robot_of(loop))))(loops)
-    batch = robots, loops.twist, loops.bend
+    batch = jax.device_put((robots, loops.twist, loops.bend))
 
     def rotation(robot: Robot, twist: jax.Array, bend: jax.Array) -> Any:
         return reojax.net_rotation(robot, reojax.manoeuvre_a(twist, bend), steps=steps)
