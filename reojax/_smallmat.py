@@ -1,5 +1,6 @@
-"""Closed-form 3x3 linear algebra. Batched LAPACK calls can deadlock on CPU, so nothing here uses any."""
+"""Linear algebra of small matrices. Batched LAPACK calls can deadlock on CPU, so nothing here uses any."""
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -11,3 +12,51 @@ def solve_symmetric3(matrix: Float[Array, "3 3"], right: Float[Array, "3 k"]) ->
     x, y, z = matrix
     adjugate = jnp.stack([jnp.cross(y, z), jnp.cross(z, x), jnp.cross(x, y)])
     return adjugate @ right / jnp.dot(x, adjugate[0])
+
+
+def solve_positive(matrix: Float[Array, "n n"], right: Float[Array, "n ..."]) -> Float[Array, "n ..."]:
+    """Solve `matrix @ x = right` for a symmetric positive definite matrix, by Cholesky; NaN for any other.
+
+    Column by column, unrolled: meant for n up to some dozens. Its derivative solves with the same factor.
+
+    Args:
+        matrix: (n, n); only its lower triangle is read.
+        right: (n,) or (n, k).
+    """
+    lower = cholesky(jax.lax.stop_gradient(matrix))
+    symmetric = jnp.tril(matrix) + jnp.tril(matrix, -1).T
+
+    def product(x: jax.Array) -> jax.Array:
+        return jnp.matmul(symmetric, x, precision="highest")
+
+    return jax.lax.custom_linear_solve(product, right, lambda _, b: cholesky_solve(lower, b), symmetric=True)
+
+
+def cholesky(matrix: Float[Array, "n n"]) -> Float[Array, "n n"]:
+    """Lower triangular `L` of `L @ L.T = matrix`; NaN where the matrix is not positive definite."""
+    n = matrix.shape[0]
+    rest, columns = matrix, []
+    for k in range(n):
+        below = (jnp.arange(n) >= k).astype(matrix.dtype)
+        column = below * rest[:, k] / jnp.sqrt(rest[k, k])
+        columns.append(column)
+        rest = rest - column[:, None] * column[None, :]
+    return jnp.stack(columns, axis=1)
+
+
+def cholesky_solve(lower: Float[Array, "n n"], right: Float[Array, "n ..."]) -> Float[Array, "n ..."]:
+    """Solve `L @ L.T @ x = right` for a lower triangular `L`."""
+    n = lower.shape[0]
+    rest, forward = jnp.asarray(right), []
+    for k in range(n):
+        forward.append(rest[k] / lower[k, k])
+        rest = rest - _outer(lower[:, k], forward[-1])
+    rest, solution = jnp.stack(forward), []
+    for k in reversed(range(n)):
+        solution.append(rest[k] / lower[k, k])
+        rest = rest - _outer(lower[k, :], solution[-1])
+    return jnp.stack(solution[::-1])
+
+
+def _outer(column: Array, row: jax.Array) -> jax.Array:
+    return column.reshape(-1, *(1,) * row.ndim) * row[None]

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from reojax._arrays import Array, as_numbers, is_concrete
 from reojax.path import Path, polygon
+from reojax.robot import Robot
 
 
 class Layout(NamedTuple):
@@ -36,6 +37,19 @@ FOUR_BODY = Layout(joints=3, twist=(0, 2), bend=1)
 
 SIX_BODY = Layout(joints=5, twist=(1, 3), bend=2, fold=(0, 4), fold_angle=(pi / 2, -pi / 2))
 """The thesis's full cat: six links, the feet fold and unfold (thesis 1.4)."""
+
+
+def layout_for(robot: Robot) -> Layout:
+    """Return the layout for `robot` by its number of joints, `FOUR_BODY` or `SIX_BODY`.
+
+    Raises:
+        ValueError: for any other number of joints.
+    """
+    layouts = {layout.joints: layout for layout in (FOUR_BODY, SIX_BODY)}
+    if robot.joints not in layouts:
+        known = " or ".join(map(str, layouts))
+        raise ValueError(f"{robot.name!r} has {robot.joints} joints; the manoeuvres are laid out for {known} joints.")
+    return layouts[robot.joints]
 
 
 def manoeuvre_a(twist: ArrayLike, bend: ArrayLike, layout: Layout = FOUR_BODY) -> Path:

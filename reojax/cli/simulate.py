@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from reojax.cli._arguments import BadInput, degrees, version
 
 if TYPE_CHECKING:
-    from reojax.manoeuvres import Layout
     from reojax.path import Path
     from reojax.robot import Robot
 
@@ -45,25 +44,13 @@ def run(args: argparse.Namespace) -> None:
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(report, args))
 
 
-def _layout(robot: "Robot") -> "Layout":
-    from reojax.manoeuvres import FOUR_BODY, SIX_BODY
-
-    layouts = {layout.joints: layout for layout in (FOUR_BODY, SIX_BODY)}
-    if robot.joints not in layouts:
-        raise ValueError(
-            f"{robot.name!r} has {robot.joints} joints; the manoeuvres are laid out for "
-            f"{' or '.join(map(str, layouts))} joints."
-        )
-    return layouts[robot.joints]
-
-
 def _path(robot: "Robot", args: argparse.Namespace) -> "Path":
     import numpy as np
 
-    from reojax.manoeuvres import manoeuvre_a, manoeuvre_b
+    from reojax.manoeuvres import layout_for, manoeuvre_a, manoeuvre_b
 
     manoeuvre = {"a": manoeuvre_a, "b": manoeuvre_b}[args.manoeuvre]
-    return manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), _layout(robot))
+    return manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), layout_for(robot))
 
 
 def _heading(args: argparse.Namespace) -> str:
@@ -79,9 +66,10 @@ def _check_picture(out: str) -> None:
 
 def _draw(robot: "Robot", path: "Path", history: Any, args: argparse.Namespace) -> None:
     from reojax import plot
+    from reojax.manoeuvres import layout_for
 
     names = ("bend", "twist", "unbend", "untwist")
-    if _layout(robot).fold is not None:
+    if layout_for(robot).fold is not None:
         names = ("fold", *names, "unfold")
     title = _heading(args).replace(" deg", "°").replace(" -", " \u2212")
     figure = plot.history_figure(robot, path, title=title, edge_names=names, rotations=history)

@@ -1,33 +1,24 @@
-"""Pictures. The only module that imports matplotlib, and without its global state."""
+"""Orientation and joint angles along a path."""
 
-import os
 from collections.abc import Sequence
-from pathlib import Path as FilePath
 
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MultipleLocator
 
 from reojax._arrays import Array
 from reojax._orientation import tilt_and_roll
-from reojax._output import check_writable, replacing
 from reojax.holonomy import rotation_history
 from reojax.path import Path
+from reojax.plot._style import INK, JOINTS, dress
 from reojax.robot import Robot
-
-FORMATS = ("png", "pdf", "svg")
-"""Kinds of picture, by the ending of the file's name."""
 
 _SAMPLES = 64
 """Samples per edge."""
-_INK, _PALE = "#222222", "#d9d9d9"
 _ANGLES = (("tilt about x", "#009e73"), ("tilt about y", "#cc79a7"), ("roll about z", "#d55e00"))
-_JOINTS = ("#0072b2", "#e69f00", "#56b4e9", "#7f3c8d", "#80ba5a", "#666666")
 _DASHES = ((None, None), (None, None), (5, 2.5), (1.5, 1.5))
 """By joint; two joints may move alike, and the one drawn last must not hide the other."""
-_SPACINGS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720, 1440, 3600, 7200, 18000)
 
 
 def history_figure(
@@ -69,71 +60,18 @@ def history_figure(
         above.plot(along, values, color=colour, label=label, linewidth=2)
     for k, label in enumerate(robot.joint_names):
         dashes = _DASHES[k % len(_DASHES)]
-        colour = _JOINTS[k % len(_JOINTS)]
+        colour = JOINTS[k % len(JOINTS)]
         below.plot(corners[:, k], color=colour, label=label, linewidth=2, dashes=dashes)
-    above.set_ylabel("base orientation [deg]", color=_INK)
-    below.set_ylabel("joint angles [deg]", color=_INK)
+    above.set_ylabel("base orientation [deg]", color=INK)
+    below.set_ylabel("joint angles [deg]", color=INK)
     for axes in (above, below):
-        _dress(axes, path.edges)
+        dress(axes, path.edges)
     _name_edges(below, edge_names, path.edges)
-    above.set_title(title or robot.name, loc="left", pad=48, fontsize=13, fontweight="bold", color=_INK)
+    above.set_title(title or robot.name, loc="left", pad=48, fontsize=13, fontweight="bold", color=INK)
     tilt = float(np.hypot(*angles[-1, :2]))
     result = f"net rotation: rolls {_signed(angles[-1, 2])} about z, and the z axis tips by {tilt:.1f}°"
-    above.annotate(result, (0, 1), (0, 30), "axes fraction", "offset points", fontsize=10.5, color=_INK)
+    above.annotate(result, (0, 1), (0, 30), "axes fraction", "offset points", fontsize=10.5, color=INK)
     return figure
-
-
-def check_picture(path: str | os.PathLike[str]) -> FilePath:
-    """Return `path` if a picture can be written there now; for asking before a long computation.
-
-    Raises:
-        ValueError: for an ending that is not in `FORMATS`, or a path that cannot be written.
-    """
-    target = FilePath(path)
-    if target.suffix[1:].lower() not in FORMATS:
-        endings = ", ".join(f".{kind}" for kind in FORMATS)
-        raise ValueError(f"cannot write {str(path)!r}: the name of a picture ends in one of {endings}.")
-    return check_writable(path)
-
-
-def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure to `path`, whole or not at all, in the format that the ending says.
-
-    Raises:
-        ValueError: for an ending that is not in `FORMATS`, or a path that cannot be written.
-    """
-    target = check_picture(path)
-    with replacing(target) as file:
-        figure.savefig(file, format=target.suffix[1:].lower(), dpi=160)
-
-
-def _dress(axes: Axes, edges: int) -> None:
-    low, high = axes.get_ylim()
-    spacing = next((s for s in _SPACINGS if (high - low) / s <= 7), _SPACINGS[-1])
-    axes.yaxis.set_major_locator(MultipleLocator(spacing))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "\u2212")))
-    axes.set_xlim(0, edges)
-    axes.set_axisbelow(True)
-    axes.grid(axis="y", color=_PALE, linewidth=0.6)
-    if edges <= 40:
-        for corner in range(1, edges):
-            axes.axvline(corner, color="#aaaaaa", linewidth=0.8, zorder=0.9)
-    axes.axhline(0, color="#888888", linewidth=0.8, zorder=0.9)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color("#888888")
-    axes.tick_params(colors=_INK, length=3, color="#888888")
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0, 1),
-        borderaxespad=0.3,
-        borderpad=0,
-        ncols=6,
-        columnspacing=1.6,
-        frameon=False,
-        handlelength=2.2,
-        fontsize=9.5,
-        labelcolor=_INK,
-    )
 
 
 def _name_edges(axes: Axes, names: Sequence[str] | None, edges: int) -> None:
@@ -142,7 +80,7 @@ def _name_edges(axes: Axes, names: Sequence[str] | None, edges: int) -> None:
         axes.tick_params(axis="x", length=0)
     elif edges <= 40:
         axes.set_xticks(np.arange(edges + 1))
-    axes.set_xlabel("along the path, edge by edge", color=_INK)
+    axes.set_xlabel("along the path, edge by edge", color=INK)
 
 
 def _signed(angle: float) -> str:

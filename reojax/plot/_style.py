@@ -1,0 +1,39 @@
+"""Colours that colour-blind people can tell apart and that print, and the look of axes."""
+
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, MultipleLocator
+
+INK, GREY, PALE = "#222222", "#888888", "#d9d9d9"
+JOINTS = ("#0072b2", "#e69f00", "#56b4e9", "#7f3c8d", "#80ba5a", "#666666")
+"""Colours of joints, in order."""
+_SPACINGS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720, 1440, 3600, 7200, 18000)
+
+
+def dress(axes: Axes, edges: int) -> None:
+    """Dress axes of angles [deg] along the edges of a path: ticks, grid, corners, legend above."""
+    low, high = axes.get_ylim()
+    spacing = next((s for s in _SPACINGS if (high - low) / s <= 7), _SPACINGS[-1])
+    axes.yaxis.set_major_locator(MultipleLocator(spacing))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "\u2212")))
+    axes.set_xlim(0, edges)
+    axes.set_axisbelow(True)
+    axes.grid(axis="y", color=PALE, linewidth=0.6)
+    if edges <= 40:
+        for corner in range(1, edges):
+            axes.axvline(corner, color="#aaaaaa", linewidth=0.8, zorder=0.9)
+    axes.axhline(0, color=GREY, linewidth=0.8, zorder=0.9)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(GREY)
+    axes.tick_params(colors=INK, length=3, color=GREY)
+    axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(0, 1),
+        borderaxespad=0.3,
+        borderpad=0,
+        ncols=6,
+        columnspacing=1.6,
+        frameon=False,
+        handlelength=2.2,
+        fontsize=9.5,
+        labelcolor=INK,
+    )

@@ -1,0 +1,35 @@
+"""Pictures in files: which kinds there are, and writing them whole or not at all."""
+
+import os
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from reojax._output import check_writable, replacing
+
+FORMATS = ("png", "pdf", "svg")
+"""Kinds of picture, by the ending of the file's name."""
+
+
+def check_picture(path: str | os.PathLike[str]) -> Path:
+    """Return `path` if a picture can be written there now; for asking before a long computation.
+
+    Raises:
+        ValueError: for an ending that is not in `FORMATS`, or a path that cannot be written.
+    """
+    target = Path(path)
+    if target.suffix[1:].lower() not in FORMATS:
+        endings = ", ".join(f".{kind}" for kind in FORMATS)
+        raise ValueError(f"cannot write {str(path)!r}: the name of a picture ends in one of {endings}.")
+    return check_writable(path)
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure to `path`, whole or not at all, in the format that the ending says.
+
+    Raises:
+        ValueError: for an ending that is not in `FORMATS`, or a path that cannot be written.
+    """
+    target = check_picture(path)
+    with replacing(target) as file:
+        figure.savefig(file, format=target.suffix[1:].lower(), dpi=160)
