@@ -59,4 +59,4 @@ def cholesky_solve(lower: Float[Array, "n n"], right: Float[Array, "n ..."]) -> 
 
 
 def _outer(column: Array, row: jax.Array) -> jax.Array:
-    return column.reshape(-1, *(1,) * row.ndim) * row[None]
+    return jnp.multiply(column.reshape(-1, *(1,) * row.ndim), row[None])
