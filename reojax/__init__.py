@@ -2,6 +2,13 @@
 
 from reojax import robots as robots, so3 as so3
 from reojax.certificate import Certificate as Certificate, certify as certify
+from reojax.dynamics import (
+    base_velocity as base_velocity,
+    forward_dynamics as forward_dynamics,
+    inverse_dynamics as inverse_dynamics,
+    joint_inertia as joint_inertia,
+    kinetic_energy as kinetic_energy,
+)
 from reojax.holonomy import net_rotation as net_rotation, rotation_history as rotation_history
 from reojax.manoeuvres import (
     FOUR_BODY as FOUR_BODY,
@@ -15,5 +22,14 @@ from reojax.momentum import (
     connection as connection,
     momentum_matrices as momentum_matrices,
 )
+from reojax.motion import Motion as Motion, simulate as simulate
+from reojax.motor import RE_MAX_17 as RE_MAX_17, Motor as Motor, with_motors as with_motors
 from reojax.path import Path as Path, joint_travel as joint_travel, polygon as polygon
 from reojax.robot import Robot as Robot, make_robot as make_robot
+from reojax.time_law import (
+    Law as Law,
+    minimum_jerk as minimum_jerk,
+    quintic as quintic,
+    trapezoid as trapezoid,
+)
+from reojax.trajectory import Trajectory as Trajectory, along as along, through as through
