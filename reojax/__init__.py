@@ -1,6 +1,6 @@
 """reojax: how a robot in free fall turns itself with its own joints, differentiably, in JAX."""
 
-from reojax import robots as robots, so3 as so3
+from reojax import design as design, robots as robots, so3 as so3
 from reojax.certificate import Certificate as Certificate, certify as certify
 from reojax.holonomy import net_rotation as net_rotation, rotation_history as rotation_history
 from reojax.manoeuvres import (

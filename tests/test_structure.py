@@ -27,6 +27,8 @@ LAYERS = [
     ["sweep.grid"],
     ["sweep.store", "sweep.devices"],
     ["sweep"],
+    ["design._quadratic"],
+    ["design._steps"],
     ["design.solver"],
     ["design.loops", "design.variables"],
     ["design.problem"],
