@@ -26,6 +26,9 @@ class BadDesign(NamedTuple):
     reason: str
     """What was wrong: a result that is not finite, or an exception."""
 
+    def __str__(self) -> str:
+        return ", ".join(f"{name}={value:g}" for name, value in self.design.items()) + f": {self.reason}"
+
 
 class Sweep:
     """Results of a sweep over a grid or list of designs, with the axes and their units.
