@@ -1,6 +1,6 @@
 """reojax: how a robot in free fall turns itself with its own joints, differentiably, in JAX."""
 
-from reojax import robots as robots, so3 as so3
+from reojax import design as design, robots as robots, so3 as so3
 from reojax.certificate import Certificate as Certificate, certify as certify
 from reojax.dynamics import (
     base_velocity as base_velocity,
@@ -26,6 +26,7 @@ from reojax.motion import Motion as Motion, simulate as simulate
 from reojax.motor import RE_MAX_17 as RE_MAX_17, Motor as Motor, with_motors as with_motors
 from reojax.path import Path as Path, joint_travel as joint_travel, polygon as polygon
 from reojax.robot import Robot as Robot, make_robot as make_robot
+from reojax.sweep import Sweep as Sweep, sweep as sweep, zipped as zipped
 from reojax.time_law import (
     Law as Law,
     minimum_jerk as minimum_jerk,
