@@ -132,9 +132,14 @@ def drive(robot: Robot, motors: Motor, theta_dot: Float[Array, " j"], load: Load
 
 
 def demand(
-    robot: Robot, motors: Motor, theta_dot: Float[Array, " j"], load: Load
+    robot: Robot, motors: Motor, theta_dot: Float[Array, " j"], load: Load, *, soft: float = 0.0
 ) -> tuple[Float[Array, " j"], Float[Array, "2 j"], Float[Array, " j"]]:
     """Voltage that a load takes, by how it grows with the speed of the motion at zero momentum [V].
+
+    Args:
+        robot, motors, theta_dot, load: as for `drive`.
+        soft: power over which driving turns into being driven back [W], so that an optimiser finds the demand
+            smooth; static. It jumps at 0, the default.
 
     Returns:
         (j,) what grows with the square of the speed: inertia, through the gear and of the rotor;
@@ -144,8 +149,9 @@ def demand(
     ratio = robot.gear_ratio
     speed = ratio * theta_dot
     geared = load.torque - load.rotor
-    driving = geared * theta_dot >= 0
-    through = geared * jnp.where(driving, 1 / motors.efficiency, motors.efficiency_back)
+    power = geared * theta_dot
+    driving = 0.5 * (1 + jnp.tanh(power / soft)) if soft else jnp.where(power >= 0, 1, 0)
+    through = geared * (driving / motors.efficiency + (1 - driving) * motors.efficiency_back)
     per_torque = motors.resistance / motors.torque_constant
     inertial = per_torque * (through + load.rotor) / ratio
     linear = jnp.stack([per_torque * motors.drag * speed, motors.torque_constant * speed])

@@ -5,6 +5,7 @@ given times (`through`), which is another path: it rounds the corners.
 """
 
 import dataclasses
+from math import comb
 from typing import NamedTuple
 
 import jax
@@ -117,6 +118,60 @@ def through(path: Path, durations: ArrayLike) -> Trajectory:
     points, times = jnp.asarray(path.waypoints, dtype), jnp.asarray(times, dtype)
     breaks = jnp.concatenate([jnp.zeros(1, dtype), jnp.cumsum(times)])
     return Trajectory(breaks, least_jerk(times, points))
+
+
+def overlapped(corners: Array, law: Law, start: Array, length: Array, moves: tuple[tuple[int, int], ...]) -> Trajectory:
+    """Trajectory along a path whose joints move edge by edge, each joint in a time of its own.
+
+    A move is one joint's part in one edge. Moves that overlap in time round the corners. Nothing is checked: moves of
+    one joint must follow one another in time.
+
+    Args:
+        corners: (v, j) waypoints [rad].
+        law: the time law of every move.
+        start: (moves,) when each move begins [s].
+        length: (moves,) how long it takes [s].
+        moves: edge and joint of each move, static.
+    """
+    edge, joint = np.array(moves).T
+    dtype = common_float(corners, start, length)
+    corners, start, length = (jnp.asarray(x, dtype) for x in (corners, start, length))
+    law = Law(*(jnp.asarray(x, dtype) for x in law))
+    turn = (corners[1:] - corners[:-1])[edge, joint]
+    ends = (start[:, None] + length[:, None] * law.breaks[None]).ravel()
+    breaks = jnp.sort(jnp.concatenate([jnp.zeros(1, dtype), ends]))
+    middle = 0.5 * (breaks[1:] + breaks[:-1])
+
+    def part(begin: Array, middle: Array, start: Array, length: Array) -> Array:
+        """Coefficients of one move's law over one interval, by powers of the time since `begin`."""
+        u = (middle - start) / length
+        piece = jnp.clip((law.breaks <= u).sum() - 1, 0, law.coefficients.shape[0] - 1)
+        powers = shifted(law.coefficients[piece], (begin - start) / length - law.breaks[piece])
+        constant = jnp.zeros_like(powers).at[0].set(jnp.where(u < 0, 0, 1))
+        return jnp.where((u < 0) | (u > 1), constant, powers) * (1 / length) ** jnp.arange(powers.shape[0])
+
+    over_moves = jax.vmap(part, (None, None, 0, 0))
+    parts = jax.vmap(over_moves, (0, 0, None, None))(breaks[:-1], middle, start, length)
+    carrier = jnp.asarray(np.eye(corners.shape[1])[joint], dtype) * turn[:, None]
+    coefficients = jnp.einsum("pmk,mj->pkj", parts, carrier)
+    return Trajectory(breaks, coefficients.at[:, 0].add(corners[:1]))
+
+
+def shifted(powers: Float[Array, " d+1"], by: Float[Array, ""]) -> Float[Array, " d+1"]:
+    """Coefficients of `f(x + by)` from those of `f(x)`, lowest power first."""
+    count = powers.shape[0]
+    rows = []
+    for k in range(count):
+        terms = [comb(n, k) * powers[n] * by ** (n - k) for n in range(k, count)]
+        rows.append(sum(terms[1:], terms[0]))
+    return jnp.stack(rows)
+
+
+def stretched(trajectory: Trajectory, factor: Float[Array, ""]) -> Trajectory:
+    """The same motion, `factor` times as long."""
+    powers = trajectory.coefficients.shape[1]
+    scale = (1 / jnp.asarray(factor)) ** jnp.arange(powers)
+    return Trajectory(trajectory.breaks * factor, trajectory.coefficients * scale[None, :, None])
 
 
 def _check_path(path: Path) -> None:

@@ -46,6 +46,7 @@ LAYERS = [
     ["trajectory"],
     ["motion"],
     ["minimum_time"],
+    ["fastest"],
     ["capture", "release", "export"],
     ["control", "calibrate"],
     ["plot._style", "plot.files", "plot._view", "plot._solids"],
