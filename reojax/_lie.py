@@ -15,18 +15,20 @@ from reojax._arrays import Array
 
 NODES = (0.0, 1 / 3, 1 / 2, 2 / 3, 1.0)
 """Shares of a step at which `a` and `M` are needed."""
-_NODE = (0, 1, 3, 1, 2, 2, 4)
+_NODE = np.array([0, 1, 3, 1, 2, 2, 4])
 """Node of each stage."""
-_STAGES = (
-    (),
-    (1 / 3,),
-    (0.0, 2 / 3),
-    (1 / 12, 1 / 3, -1 / 12),
-    (-1 / 16, 9 / 8, -3 / 16, -3 / 8),
-    (0.0, 9 / 8, -3 / 8, -3 / 4, 1 / 2),
-    (9 / 44, -9 / 11, 63 / 44, 18 / 11, 0.0, -16 / 11),
+_STAGES = np.array(
+    [
+        [0, 0, 0, 0, 0, 0, 0],
+        [1 / 3, 0, 0, 0, 0, 0, 0],
+        [0, 2 / 3, 0, 0, 0, 0, 0],
+        [1 / 12, 1 / 3, -1 / 12, 0, 0, 0, 0],
+        [-1 / 16, 9 / 8, -3 / 16, -3 / 8, 0, 0, 0],
+        [0, 9 / 8, -3 / 8, -3 / 4, 1 / 2, 0, 0],
+        [9 / 44, -9 / 11, 63 / 44, 18 / 11, 0, -16 / 11, 0],
+    ]
 )
-_WEIGHTS = (11 / 120, 0.0, 27 / 40, 27 / 40, -4 / 15, -4 / 15, 11 / 120)
+_WEIGHTS = np.array([11 / 120, 0, 27 / 40, 27 / 40, -4 / 15, -4 / 15, 11 / 120])
 _SERIES = (1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160)
 """Of `(1 - x/2 cot(x/2)) / x^2` in powers of `x^2`."""
 
@@ -46,15 +48,21 @@ def orientations(
         momentum: (3,) `H`.
     """
 
+    stages, weights = jnp.asarray(_STAGES, own.dtype), jnp.asarray(_WEIGHTS, own.dtype)
+
     def step(rotation: Array, inputs: tuple[Array, Array, Array]) -> tuple[Array, Array]:
         h, a, m = inputs
         body = _apply(rotation.T, momentum)
-        slopes: list[Array] = []
-        for node, row in zip(_NODE, _STAGES, strict=True):
-            u = h * _mixed(row, slopes)
-            omega = a[node] + _apply(m[node], _apply(so3.exp(-u), body))
-            slopes.append(_untwisted(u, omega))
-        turn = so3.exp(h * _mixed(_WEIGHTS, slopes))
+
+        def stage(slopes: jax.Array, inputs: tuple[Array, Array, Array, Array]) -> tuple[Array, None]:
+            index, row, a, m = inputs
+            u = h * (row @ slopes)
+            omega = a + _apply(m, _apply(so3.exp(-u), body))
+            return slopes.at[index].set(_untwisted(u, omega)), None
+
+        every = (jnp.arange(len(_NODE)), stages, a[_NODE], m[_NODE])
+        slopes, _ = jax.lax.scan(stage, jnp.zeros((len(_NODE), 3), own.dtype), every)
+        turn = so3.exp(h * (weights @ slopes))
         rotation = jnp.matmul(rotation, turn, precision="highest")
         return rotation, rotation
 
@@ -69,13 +77,6 @@ def _untwisted(u: Array, omega: Array) -> Array:
     factor = jnp.polyval(jnp.asarray(_SERIES[::-1], u.dtype), square)
     once = jnp.cross(u, omega)
     return omega + 0.5 * once + factor * jnp.cross(u, once)
-
-
-def _mixed(weights: tuple[float, ...], slopes: list[Array]) -> Array:
-    total = jnp.zeros(3, slopes[0].dtype if slopes else None)
-    for weight, slope in zip(weights, slopes, strict=True):
-        total = total + weight * slope
-    return total
 
 
 def _apply(matrix: Array, vector: Array) -> Array:

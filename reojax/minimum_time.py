@@ -27,6 +27,12 @@ DEFAULT_SAMPLES = 256
 """Instants per piece of a law at which the motors are looked at."""
 
 
+FALL = (2 * 2.0 / 9.80665) ** 0.5
+"""Time that a fall of 2 m takes, the drop tower's (thesis 1.8) [s]."""
+AVAILABLE = FALL - 0.02
+"""What is left of it for a motion that starts 0.02 s after the release (thesis 1.8) [s]."""
+
+
 class LeastTime(NamedTuple):
     """Least durations of a path's edges under a time law, and what sets them."""
 

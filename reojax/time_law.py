@@ -47,7 +47,7 @@ def trapezoid(ramp: ArrayLike = 1 / 3) -> Law:
     zero, one = xp.zeros_like(r), xp.ones_like(r)
     breaks = xp.stack([zero, r, 1 - r, one])
     rows = [(zero, zero, rate / (2 * r)), (rate * r / 2, rate, zero), (1 - rate * r / 2, rate, -rate / (2 * r))]
-    return Law(breaks, xp.stack([xp.stack(row) for row in rows]))
+    return Law(breaks, xp.stack([xp.stack([*row, zero, zero, zero]) for row in rows]))  # of one degree for all laws
 
 
 def minimum_jerk(times: ArrayLike = (), places: ArrayLike = ()) -> Law:

@@ -16,4 +16,5 @@ from reojax.plot.frames import (
     frames_figure as frames_figure,
 )
 from reojax.plot.history import history_figure as history_figure
+from reojax.plot.motion import motion_figure as motion_figure, torque_speed_figure as torque_speed_figure
 from reojax.plot.robots import draw_axes as draw_axes, draw_robot as draw_robot, draw_robot_flat as draw_robot_flat

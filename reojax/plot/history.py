@@ -11,14 +11,11 @@ from reojax._arrays import Array
 from reojax._orientation import tilt_and_roll
 from reojax.holonomy import rotation_history
 from reojax.path import Path
-from reojax.plot._style import INK, JOINTS, dress
+from reojax.plot._style import ANGLES, DASHES, INK, JOINTS, dress
 from reojax.robot import Robot
 
 _SAMPLES = 64
 """Samples per edge."""
-_ANGLES = (("tilt about x", "#009e73"), ("tilt about y", "#cc79a7"), ("roll about z", "#d55e00"))
-_DASHES = ((None, None), (None, None), (5, 2.5), (1.5, 1.5))
-"""By joint; two joints may move alike, and the one drawn last must not hide the other."""
 
 
 def history_figure(
@@ -56,10 +53,10 @@ def history_figure(
     figure = Figure(figsize=(7.2, 6.4), layout="constrained", facecolor="white")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.15, 1))
     along = np.linspace(0, path.edges, len(angles))
-    for (label, colour), values in zip(_ANGLES, angles.T, strict=True):
+    for (label, colour), values in zip(ANGLES, angles.T, strict=True):
         above.plot(along, values, color=colour, label=label, linewidth=2)
     for k, label in enumerate(robot.joint_names):
-        dashes = _DASHES[k % len(_DASHES)]
+        dashes = DASHES[k % len(DASHES)]
         colour = JOINTS[k % len(JOINTS)]
         below.plot(corners[:, k], color=colour, label=label, linewidth=2, dashes=dashes)
     above.set_ylabel("base orientation [deg]", color=INK)

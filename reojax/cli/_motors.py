@@ -1,0 +1,46 @@
+"""What the subcommands that drive the joints share: the motors' supply and numbers that must be positive."""
+
+import argparse
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from reojax.motor import Motor
+
+LONGEST = 1e4
+"""Longest duration at the command line [s]."""
+
+
+def add_motors(parser: argparse.ArgumentParser, *, law: str | None) -> None:
+    """Declare `--supply` and `--law`; `law` is its default."""
+    laws = "quintic, trapezoid or minimum-jerk"
+    default = "" if law is None else " [%(default)s]"
+    parser.add_argument("--law", default=law, metavar="NAME", help=f"time law of every edge: {laws}{default}")
+    parser.add_argument("--supply", type=volts, default=12.0, metavar="V", help="supply of the motors [%(default)g]")
+
+
+def volts(text: str) -> float:
+    """Read a supply voltage (an argparse type)."""
+    return _positive(text, "a supply voltage", 1e4)
+
+
+def seconds(text: str) -> float:
+    """Read a duration (an argparse type)."""
+    return _positive(text, "a duration in seconds", LONGEST)
+
+
+def motor_at(supply: float) -> "Motor":
+    """The prototype's motor at a supply [V]."""
+    from reojax.motor import RE_MAX_17
+
+    return RE_MAX_17._replace(supply=supply)
+
+
+def _positive(text: str, what: str, most: float) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not (math.isfinite(number) and 0 < number <= most):
+        raise argparse.ArgumentTypeError(f"{text!r} is not {what}: it must be above 0 and at most {most:g}")
+    return number
