@@ -16,4 +16,5 @@ from reojax.momentum import (
     momentum_matrices as momentum_matrices,
 )
 from reojax.path import Path as Path, joint_travel as joint_travel, polygon as polygon
+from reojax.plan import Plan as Plan, plan as plan, plan_many as plan_many, replan as replan
 from reojax.robot import Robot as Robot, make_robot as make_robot
