@@ -17,7 +17,7 @@ from reojax.plan.result import Plan as Plan, first_of, plans
 from reojax.plan.words import VOCABULARIES, box_of
 from reojax.robot import Robot
 
-_BATCH = 1024
+_BATCH = 4096
 """Targets solved together, between two reports of progress."""
 _KEPT = 8
 """Robots and limits whose tables are kept."""

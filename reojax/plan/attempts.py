@@ -19,8 +19,10 @@ _ROWS = 256
 """Rows per call."""
 SIZES = (2, 4, 6)
 """Numbers of slots that there are programs for."""
-_NEWTON = 8
+_NEWTON = 12
 """Steps on the true rotations."""
+_SOFTEST = 1e-10
+"""Least damping of those steps, relative to the squared derivatives."""
 
 
 class Scene(NamedTuple):
@@ -42,7 +44,7 @@ class Rows(NamedTuple):
     """(m,) index of the target."""
     letter: np.ndarray
     """(k, m) letters, -1 unused."""
-    count: np.ndarray
+    runs: np.ndarray
     """(k, m) how often each loop is run."""
     x: np.ndarray
     """(d, k, m) amplitudes [rad]."""
@@ -68,7 +70,7 @@ def price(box: Box, letter: np.ndarray, count: np.ndarray) -> np.ndarray:
 
 def travel(box: Box, rows: Rows) -> np.ndarray:
     """Joint travel (m,) [rad] of the loops of each row."""
-    return (price(box, rows.letter, rows.count) * np.abs(rows.x)).sum((0, 1))
+    return (price(box, rows.letter, rows.runs) * np.abs(rows.x)).sum((0, 1))
 
 
 def attempt(scene: Scene, targets: np.ndarray, rows: Rows) -> Rows:
@@ -84,32 +86,37 @@ def shortened(scene: Scene, targets: np.ndarray, rows: Rows) -> Rows:
 def settle(scene: Scene, targets: np.ndarray, rows: Rows, tolerance: float) -> Rows:
     """Solve rows on the true net rotations; `square` is then true, and amplitudes are the best seen."""
     best = rows._replace(square=np.full(rows.square.shape, np.inf))
+    x, strength = rows.x.copy(), np.full(rows.square.shape, _SOFTEST)
     going = np.arange(len(rows.owner))
-    at = rows
     for _ in range(_NEWTON):
         if not len(going):
             break
-        slots = at.letter.shape[0]
-        used = at.letter >= 0
-        last = last_twist(scene.box.letters, at.letter, at.x)
-        true = np.zeros((4, slots, len(going)))
-        true[0] = 1
-        true[:, used] = true_rotations(
-            scene.robot, scene.layout, np.stack([at.x[0][used], at.x[1][used], last[used]])
-        )
-        results = [
-            (square[:size], x[..., :size])
-            for word, x, size, part in _chunks(scene, targets, at)
-            for square, x in [refine(scene.table, word, x, _padded(true[..., part], _ROWS, 1.0))]
-        ]
-        square = np.concatenate([np.asarray(s) for s, _ in results])
-        x = np.concatenate([np.asarray(x) for _, x in results], axis=-1)
+        at = rows._replace(x=x).take(going)
+        square, moved = _true_step(scene, targets, at, strength[going])
         better = square < best.square[going]
         best.square[going] = np.where(better, square, best.square[going])
         best.x[..., going] = np.where(better, at.x, best.x[..., going])
-        moving = better & (square > min(tolerance, 1e-11) ** 2)
-        going, at = going[moving], at._replace(x=x).take(moving)
+        strength[going] *= np.where(better, 0.1, 100)
+        strength = np.maximum(strength, _SOFTEST)
+        x[..., going] = np.where(better, moved, 0.5 * (at.x + best.x[..., going]))
+        going = going[best.square[going] > min(tolerance, 1e-11) ** 2]
     return best
+
+
+def _true_step(scene: Scene, targets: np.ndarray, rows: Rows, strength: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Squared residuals on the true rotations, and amplitudes after one step."""
+    used = rows.letter >= 0
+    last = last_twist(scene.box.letters, rows.letter, rows.x)
+    true = np.zeros((4, *used.shape))
+    true[0] = 1
+    true[:, used] = true_rotations(scene.robot, scene.layout, np.stack([rows.x[0], rows.x[1], last])[:, used])
+    squares, moved = [], []
+    for word, x, size, part in _chunks(scene, targets, rows):
+        known = _padded(true[..., part], _ROWS, 1.0), _padded(strength[part], _ROWS, 1.0)
+        square, x = refine(scene.table, word, x, *known)
+        squares.append(np.asarray(square)[:size])
+        moved.append(np.asarray(x)[..., :size])
+    return np.concatenate(squares), np.concatenate(moved, axis=-1)
 
 
 def starting_rows(owner: np.ndarray, starts: Starts) -> Rows:
@@ -133,7 +140,7 @@ def least(rows: Rows, value: np.ndarray, keep: int = 1) -> Rows:
 def _on_table(scene: Scene, targets: np.ndarray, rows: Rows, program: Callable) -> Rows:
     def run(chunk):
         word, x, size, _ = chunk
-        costs = price(scene.box, np.asarray(word.letter), np.asarray(word.count))
+        costs = price(scene.box, np.asarray(word.letter), np.asarray(word.runs))
         found = program(word, x, costs)
         return np.asarray(found.x)[..., :size], np.asarray(found.square)[:size]
 
@@ -155,7 +162,7 @@ def _chunks(scene: Scene, targets: np.ndarray, rows: Rows) -> Iterator[tuple[Wor
         low, high = (np.moveaxis(np.where((letter >= 0)[..., None], edge[letter], 0.0), -1, 0) for edge in box[1:])
         target = _padded(targets[:, rows.owner[part]], _ROWS, 0.0)
         target[0, size:] = 1.0
-        word = Word(letter, _padded(rows.count[:, part], _ROWS, 1.0), target, low, high)
+        word = Word(letter, _padded(rows.runs[:, part], _ROWS, 1.0), target, low, high)
         yield word, _padded(rows.x[..., part], _ROWS, 0.0), size, part
 
 

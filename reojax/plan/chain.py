@@ -21,7 +21,7 @@ class Word(NamedTuple):
 
     letter: Int[Array, "k m"]
     """Letters; -1 for a slot that is not used."""
-    count: Float[Array, "k m"]
+    runs: Float[Array, "k m"]
     """How many times over each loop is run."""
     target: Float[Array, "4 m"]
     """Rotations to reach, quaternions, between the folded ends of the word."""
@@ -50,7 +50,7 @@ def miss(table: Table, word: Word, x: Float[Array, "d k m"]) -> Miss:
 
 def chained(word: Word, q: Float[Array, "4 k m"], dq: Float[Array, "d 4 k m"]) -> Miss:
     """Put the loops' quaternions and their derivatives together."""
-    q, dq = _powers(word.count, q, dq)
+    q, dq = _powers(word.runs, q, dq)
     slots = q.shape[1]
     before = [inverse(tuple(word.target))]
     for i in range(slots):
@@ -89,9 +89,15 @@ def _powers(count: Array, q: Array, dq: Array) -> tuple[Array, Array]:
     return jnp.concatenate([c[None], ratio[None] * v]), jnp.concatenate([dw[:, None], dv], axis=1)
 
 
-def step(m: Miss, free: Bool[Array, "d k m"], damping: Float[Array, " m"]) -> Float[Array, "d k m"]:
-    """Gauss-Newton step of the free amplitudes, shortest if there are many: `-J^T (J J^T + damping)^-1 r`."""
-    return -pull(m.jacobian, dual(m.jacobian, free, damping, m.residual), free)
+def step(
+    m: Miss, free: Bool[Array, "d k m"], held: Float[Array, "d k m"], damping: Float[Array, " m"]
+) -> Float[Array, "d k m"]:
+    """Gauss-Newton step of the free amplitudes while the others move by `held`: `-J^T (J J^T + damping)^-1 r`.
+
+    Of all steps to the target it is the shortest.
+    """
+    residual = m.residual + (m.jacobian * held[:, :, None]).sum((0, 1))
+    return -pull(m.jacobian, dual(m.jacobian, free, damping, residual), free)
 
 
 def pull(jacobian: Array, force: Array, free: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._arrays import as_numbers, is_concrete
-from reojax.manoeuvres import FOUR_BODY, Layout, _check_layout, layout_for
+from reojax.manoeuvres import Layout, _check_layout, layout_for
 from reojax.robot import Robot
 
 OBJECTIVES = ("count", "travel")
@@ -34,7 +34,8 @@ def rotations(entry: str, value: ArrayLike, shape: tuple[int, ...]) -> np.ndarra
         away = np.abs(matrix.T @ matrix - np.eye(3)).max()
         if away > _ORTHOGONAL:
             raise ValueError(
-                f"{name} is no rotation: an entry of R^T R - 1 is {away:.3g} in size; at most {_ORTHOGONAL:g} is rounding."
+                f"{name} is no rotation: an entry of R^T R - 1 is {away:.3g} in size; "
+                f"rounding explains {_ORTHOGONAL:g} at most."
             )
         if np.linalg.det(matrix) < 0:
             raise ValueError(f"{name} is no rotation: its determinant is {np.linalg.det(matrix):.6g}, a reflection.")

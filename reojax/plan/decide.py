@@ -9,16 +9,23 @@ import numpy as np
 
 from reojax.plan import quaternions
 from reojax.plan.attempts import SIZES, Rows, Scene, attempt, least, settle, shortened, starting_rows, travel
+from reojax.plan.library import Starts
 
 LONGEST = 5
 """Longest word whose loops each have amplitudes of their own; longer words repeat loops."""
-_ROUNDS = ((0, 8), (8, 48))
-"""Starts tried for each target, first to last in order of distance; the second round where the first failed."""
-_FAR = {1: 0.1, 2: 0.3}
+_ROUNDS = ((0, 3), (3, 10), (10, 40))
+"""Starts tried for each target, from and to in order of distance; each round where those before failed."""
+_HOPE = 0.1
+"""Squared residual [rad^2] that some start must come down to for another round."""
+_FAR = {1: 0.06, 2: 0.1, 3: 0.15}
 """Chord to the nearest start beyond which a word of so many loops is not tried; longer words: `_FAR_LONG`."""
-_FAR_LONG = 0.5
+_FAR_LONG = 0.25
 _CLOSE = 1e-9
 """Squared residual on the table [rad^2] from which the true rotations are tried."""
+_EXACT = 1e-13
+"""Squared residual on the table that leaves no doubt."""
+_AGAIN = 4
+"""Rows of a target that are tried on the true rotations where the first one failed."""
 _LEAST_TRAVEL = 10
 """Starts of least travel among the nearest ones, when travel counts."""
 
@@ -50,7 +57,7 @@ class Answer:
         better |= reaches & reached & (cost < self.travel[rows.owner])
         owner, rows, cost = rows.owner[better], rows.take(better), cost[better]
         slots = rows.letter.shape[0]
-        for field, value, blank in (("letter", rows.letter, -1), ("count", rows.count, 1.0), ("x", rows.x, 0.0)):
+        for field, value, blank in (("letter", rows.letter, -1), ("runs", rows.runs, 1.0), ("x", rows.x, 0.0)):
             mine = getattr(self.rows, field)
             mine[..., owner] = blank
             mine[..., :slots, owner] = value
@@ -62,15 +69,17 @@ def fewest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> An
     """Words of the fewest loops, up to `most`, and of these of least travel, for targets (4, m)."""
     answer = Answer(scene, targets, tolerance)
     for slots in range(1, min(most, LONGEST) + 1):
+        waiting = np.flatnonzero(~answer.solved)
+        starts = scene.library.near(targets[:, waiting], slots, _ROUNDS[-1][1])
+        closest = np.where(starts.distance[:, 0] < _FAR.get(slots, _FAR_LONG), 0.0, np.inf)
         for first, last in _ROUNDS:
-            waiting = np.flatnonzero(~answer.solved)
-            starts = scene.library.near(targets[:, waiting], slots, last)
-            near = starts.distance[:, 0] < _FAR.get(slots, _FAR_LONG)
-            starts = starts._replace(**{f: getattr(starts, f)[..., near, first:] for f in starts._fields})
-            found = attempt(scene, targets, starting_rows(waiting[near], starts))
+            trying = np.flatnonzero(~answer.solved[waiting] & (closest < _HOPE))
+            some = Starts(*(field[..., trying, first:last] for field in starts))
+            found = attempt(scene, targets, starting_rows(waiting[trying], some))
+            closest[trying] = found.square.reshape(-1, last - first).min(1)
             missed = found.take(found.square >= _CLOSE)
             answer.offer(least(missed, missed.square))
-            _offer_solved(scene, targets, answer, found, keep=2)
+            _offer_solved(scene, targets, answer, found, keep=1)
     return answer
 
 
@@ -92,10 +101,12 @@ def cheapest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> 
 def _offer_solved(scene: Scene, targets: np.ndarray, answer: Answer, found: Rows, keep: int) -> None:
     """Shorten what reaches the target on the table, and solve it on the true rotations."""
     found = found.take(found.square < _CLOSE)
-    short = shortened(scene, targets, least(found, travel(scene.box, found), keep))
+    value = travel(scene.box, found) + np.where(found.square > _EXACT, 1e3, 0.0)
+    short = shortened(scene, targets, least(found, value, keep))
     answer.offer(settle(scene, targets, least(short, travel(scene.box, short)), answer.tolerance))
-    lost = ~answer.solved[found.owner]
-    answer.offer(settle(scene, targets, least(found.take(lost), found.square[lost]), answer.tolerance))
+    lost = ~answer.solved[found.owner]  # at the edge of what can be reached, where the table is not enough
+    again = settle(scene, targets, least(found.take(lost), found.square[lost], _AGAIN), answer.tolerance)
+    answer.offer(least(again, again.square))
 
 
 def from_folded(scene: Scene, targets: np.ndarray) -> np.ndarray:

@@ -54,7 +54,7 @@ class Library:
         return Starts(self._letter[index][:, nearest], self._x[:, index][:, :, nearest], distance.reshape(-1, count))
 
     def _of(self, slots: int):
-        from scipy.spatial import cKDTree
+        from scipy.spatial import KDTree
 
         if slots not in self._words:
             everything = np.arange(len(self._letter))[None]
@@ -63,5 +63,5 @@ class Library:
             for row in index[1:]:
                 q = np.stack(quaternions.product(q, self._q[:, row]))
             q = q / np.sqrt((q * q).sum(0))
-            self._words[slots] = index, cKDTree(np.concatenate([q, -q], axis=1).T)
+            self._words[slots] = index, KDTree(np.concatenate([q, -q], axis=1).T)
         return self._words[slots]

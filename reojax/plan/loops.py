@@ -73,7 +73,7 @@ def tabulate(robot: Robot, layout: Layout, box: Box) -> Table:
     counts = [int(np.clip(np.ceil(w / _CELL) + 1, _FEWEST_NODES[d], _MOST_NODES[d])) for w in widest]
     values = []
     for kind in range(kinds):
-        axes = [np.linspace(*ends, n) for *ends, n in zip(box.low[kind], box.high[kind], counts, strict=True)]
+        axes = [np.linspace(a, b, n) for a, b, n in zip(box.low[kind], box.high[kind], counts, strict=True)]
         x = np.stack([a.ravel() for a in np.meshgrid(*axes, indexing="ij")])
         last = last_twist(box.letters, np.full(x.shape[1], kind), x)
         q = true_rotations(robot, layout, np.stack([x[0], x[1], last])).reshape(4, *counts)
@@ -141,7 +141,7 @@ def read(table: Table, word: Array, x: Array) -> tuple[Array, Array]:
 
     loop = (word >= 0)[None]
     one = jnp.zeros_like(values[:, 0]).at[0].set(1.0)
-    slopes = [jnp.where(loop, total(orders), 0.0) for orders in np.eye(d, dtype=int)]
+    slopes = [jnp.where(loop, total(orders), 0.0) for orders in np.eye(d, dtype=int).tolist()]
     return jnp.where(loop, total([0] * d), one), jnp.stack(slopes)
 
 

@@ -1,7 +1,7 @@
 """What planning gives back."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -48,12 +48,12 @@ def plans(scene: Scene, rows: Rows, targets: np.ndarray, tolerance: float) -> Pl
     true[:, moving] = true_rotations(scene.robot, layout, np.stack([rows.x[0], rows.x[1], twisted])[:, moving])
     turned = scene.fold[:, None]
     for slot in range(rows.letter.shape[0]):
-        turned = np.stack(quaternions.product(turned, quaternions.power(true[:, slot], rows.count[slot])))
+        turned = np.stack(quaternions.product(turned, quaternions.power(true[:, slot], rows.runs[slot])))
     turned = np.stack(quaternions.product(turned, quaternions.inverse(scene.fold[:, None])))
     turned = turned / np.sqrt((turned * turned).sum(0))
     error = quaternions.angles(quaternions.product(quaternions.inverse(targets), turned))
 
-    repeats = np.where(moving, rows.count, 0).astype(int).T
+    repeats = np.where(moving, rows.runs, 0).astype(int).T
     length = repeats.sum(1)
     flat = [np.repeat(field.T.ravel(), repeats.ravel()) for field in (rows.letter, rows.x[0], rows.x[1], twisted)]
     ends = np.cumsum(length)[:-1]
@@ -76,8 +76,9 @@ def plans(scene: Scene, rows: Rows, targets: np.ndarray, tolerance: float) -> Pl
 
 def first_of(many: Plan) -> Plan:
     """Return the one plan of many."""
-    one = Plan(*(field[0] for field in many))
-    return one._replace(word=tuple(map(str, one.word)))
+    one: dict[str, Any] = {name: field[0] for name, field in many._asdict().items()}
+    one["word"] = tuple(map(str, one["word"]))
+    return Plan(**one)
 
 
 def _stack(rows: Sequence[np.ndarray], fill: str | float | None) -> np.ndarray:
@@ -87,7 +88,8 @@ def _stack(rows: Sequence[np.ndarray], fill: str | float | None) -> np.ndarray:
     def filled(row: np.ndarray) -> np.ndarray:
         if len(row) == longest:
             return row
-        rest = np.full(longest - len(row), fill, row.dtype) if fill is not None else row[-1:].repeat(longest - len(row), 0)
+        missing = longest - len(row)
+        rest = row[-1:].repeat(missing, 0) if fill is None else np.full(missing, fill, row.dtype)
         return np.concatenate([row, rest])
 
     return np.array([filled(row) for row in rows])

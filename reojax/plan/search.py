@@ -32,7 +32,7 @@ class Found(NamedTuple):
 
 
 @partial(jax.jit, static_argnums=3)
-def solve(table: Table, word: Word, x: Array, steps: int = 30) -> Found:
+def solve(table: Table, word: Word, x: Array, steps: int = 16) -> Found:
     """Bring words to their targets by Levenberg-Marquardt steps, clipped to the box."""
     at = miss(table, word, x)
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
@@ -41,7 +41,7 @@ def solve(table: Table, word: Word, x: Array, steps: int = 30) -> Found:
         i, x, at, strength = state
         length = jnp.sqrt(at.square)
         damping = strength * length * (at.jacobian**2).sum((0, 1, 2))
-        dx = _inside(x, word, used, lambda free: step(at, free, damping))
+        dx = _inside(x, word, used, lambda free, held: step(at, free, held, damping))
         tried = jnp.clip(x + dx, word.low, word.high)
         then = miss(table, word, tried)
         better = then.square < at.square
@@ -58,7 +58,7 @@ def solve(table: Table, word: Word, x: Array, steps: int = 30) -> Found:
 
 
 @partial(jax.jit, static_argnums=4)
-def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], steps: int = 40) -> Found:
+def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], steps: int = 20) -> Found:
     """Move solved words along their solutions to less travel, `sum(price |x|)`, each amplitude keeping its sign."""
     sign = jnp.where(x < 0, -1.0, 1.0).astype(x.dtype)
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
@@ -66,12 +66,12 @@ def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], st
     slope = price * sign
     zero = jnp.zeros_like(x[0, 0])
 
-    def direction(at: Miss, free: Array, reach: Array) -> Array:
+    def direction(at: Miss, free: Array, held: Array, reach: Array) -> Array:
         downhill = jnp.where(free, slope, 0.0)
         force = dual(at.jacobian, free, zero, (at.jacobian * downhill[:, :, None]).sum((0, 1)))
         along = pull(at.jacobian, force, free) - downhill
         longest = jnp.abs(along).max((0, 1))
-        return (reach / jnp.where(longest > 0, longest, 1.0))[None, None] * along + step(at, free, zero)
+        return (reach / jnp.where(longest > 0, longest, 1.0))[None, None] * along + step(at, free, held, zero)
 
     def body(_, state):
         x, at, reach = state
@@ -79,7 +79,7 @@ def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], st
         def move(i, moving):  # first along the solutions, then twice back to them
             tried, then = moving
             length = jnp.where(i == 0, reach, 0.0)
-            dx = _inside(tried, word, used, lambda free: direction(then, free, length))
+            dx = _inside(tried, word, used, lambda free, held: direction(then, free, held, length))
             tried = jnp.clip(tried + dx, word.low, word.high)
             return tried, miss(table, word, tried)
 
@@ -95,28 +95,55 @@ def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], st
 
 
 @jax.jit
-def refine(table: Table, word: Word, x: Array, true: Float[Array, "4 k m"]) -> tuple[Array, Array]:
-    """Residuals with the `true` rotations of the loops, and amplitudes after a Newton step from them.
+def refine(
+    table: Table, word: Word, x: Array, true: Float[Array, "4 k m"], strength: Float[Array, " m"]
+) -> tuple[Array, Array]:
+    """Residuals with the `true` rotations of the loops, and amplitudes after a step from them, damped by `strength`.
 
     The derivatives are those of the table, good to some 1e-5, so that each step takes about five digits off.
     """
-    _, slopes = read(table, word.letter, x)
-    at = chained(word, true, slopes)
+    near, slopes = read(table, word.letter, x)
+    same_sign = jnp.where(((true * near).sum(0) < 0)[None], -true, true)
+    at = chained(word, same_sign, slopes)
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
-    damping = 1e-9 * (at.jacobian**2).sum((0, 1, 2))
-    dx = _inside(x, word, used, lambda free: step(at, free, damping))
+    damping = strength * (at.jacobian**2).sum((0, 1, 2))
+    dx = _up_to_the_edge(x, word, used, lambda free, held: step(at, free, held, damping))
     return at.square, jnp.clip(x + dx, word.low, word.high)
 
 
-def _inside(x: Array, word: Word, used: Array, direction: Callable[[Array], Array]) -> Array:
-    """Direction in which amplitudes at the edge of the box that would leave it are held."""
+def _inside(x: Array, word: Word, used: Array, direction: Callable[[Array, Array], Array]) -> Array:
+    """Step in which amplitudes on the edge of the box that would leave it are held.
+
+    Args:
+        x: amplitudes, inside the box.
+        word: holds the box.
+        used: slots that exist.
+        direction: step of the free amplitudes, given which are free and the steps of those that are not.
+    """
+    rest = jnp.zeros_like(x)
 
     def hold(_, state):
         free, dx = state
         free = free & ~(((x <= word.low) & (dx < 0)) | ((x >= word.high) & (dx > 0)))
-        return free, direction(free)
+        return free, direction(free, rest)
 
-    return jax.lax.fori_loop(0, 3, hold, (used, jnp.zeros_like(x)))[1]
+    return jax.lax.fori_loop(0, 3, hold, (used, rest))[1]
+
+
+def _up_to_the_edge(x: Array, word: Word, used: Array, direction: Callable[[Array, Array], Array]) -> Array:
+    """Step in which amplitudes that would leave the box go to its edge, and the others make up for it.
+
+    For short steps; with long ones all amplitudes would end on the edge. Arguments as for `_inside`.
+    """
+
+    def hold(_, state):
+        free, dx = state
+        held = jnp.where(free, 0.0, dx)
+        dx = jnp.where(free, direction(free, held), dx)
+        beyond = (x + dx < word.low) | (x + dx > word.high)
+        return free & ~beyond, jnp.where(beyond, jnp.clip(x + dx, word.low, word.high) - x, dx)
+
+    return jax.lax.fori_loop(0, 4, hold, (used, jnp.zeros_like(x)))[1]
 
 
 def _choose(better: Array, then: Miss, at: Miss) -> Miss:
