@@ -10,7 +10,7 @@ import pytest
 PACKAGE = Path(__file__).parent.parent / "reojax"
 
 LAYERS = [
-    ["_arrays", "_robot_checks", "_output", "_session"],
+    ["_arrays", "_robot_checks", "_output", "_session", "_shown"],
     ["_smallmat", "_orientation", "so3", "robot", "path"],
     ["momentum", "manoeuvres"],
     ["_fast.scalar", "_fast.sincos", "_fast.nodes"],
@@ -29,7 +29,7 @@ LAYERS = [
     ["sweep.identity", "sweep.engine", "sweep.memory"],
     ["sweep.store"],
     ["sweep.merge"],
-    ["sweep.run"],
+    ["sweep.run", "sweep.turns"],
     ["sweep"],
     ["design._quadratic"],
     ["design._steps"],
@@ -49,11 +49,12 @@ LAYERS = [
     ["capture", "release", "export"],
     ["control", "calibrate"],
     ["plot._style", "plot.files", "plot._view", "plot._solids"],
-    ["plot.history", "plot.robots"],
+    ["plot.history", "plot.robots", "plot.sweeps"],
     ["plot.frames"],
     ["plot"],
     ["cli._arguments"],
-    ["cli.simulate"],
+    ["cli._axes", "cli._results"],
+    ["cli.simulate", "cli.sweep", "cli.merge"],
     ["cli"],
     ["__init__", "__main__"],
 ]

@@ -17,3 +17,4 @@ from reojax.plot.frames import (
 )
 from reojax.plot.history import history_figure as history_figure
 from reojax.plot.robots import draw_axes as draw_axes, draw_robot as draw_robot, draw_robot_flat as draw_robot_flat
+from reojax.plot.sweeps import sweep_figure as sweep_figure
