@@ -10,10 +10,10 @@ import os
 import sys
 from collections.abc import Sequence
 
-from reojax.cli import simulate
+from reojax.cli import compare, simulate
 from reojax.cli._arguments import BadInput, Parser, joined, version
 
-COMMANDS = {"simulate": simulate}
+COMMANDS = {"simulate": simulate, "compare": compare}
 """Subcommands by name."""
 
 
