@@ -33,7 +33,8 @@ from reojax.robot import Robot
 SINGULAR = 1e-6
 """Smallest singular value of the derivatives, columns of length one, that counts as telling parameters apart."""
 VAGUE = 0.5
-"""Standard deviation, as a share of a parameter's scale, beyond which the capture does not determine it."""
+"""Standard deviation, as a share of a parameter's scale (or of a positive one's value, if that is smaller), beyond
+which the capture does not determine it."""
 
 
 class Calibration(NamedTuple):
@@ -65,7 +66,7 @@ class Calibration(NamedTuple):
     condition: float
     """Ratio of the largest to the smallest singular value of the derivatives, columns scaled to length one."""
     identifiable: tuple[bool, ...]
-    """For each parameter, whether its standard deviation is below half its scale."""
+    """For each parameter, whether its standard deviation is below half its scale, or value."""
     warning: str
     """What the capture does not tell, in words; empty if all is well."""
     converged: bool
@@ -244,10 +245,10 @@ class _Problem:
         jacobian = state.derivative.reshape(-1, state.derivative.shape[-1])
         lengths = np.linalg.norm(jacobian, axis=0)
         lengths = np.where(lengths > 0, lengths, 1.0)
-        _, size, directions = np.linalg.svd(jacobian / lengths, full_matrices=False)
-        known = size > SINGULAR * size[0]
+        _, singular, directions = np.linalg.svd(jacobian / lengths, full_matrices=False)
+        known = singular > SINGULAR * singular[0]
         lost = (np.abs(directions[~known]) > 0.01).any(axis=0) | (np.linalg.norm(jacobian, axis=0) == 0)
-        inverse = (directions[known].T / size[known] ** 2) @ directions[known] / np.outer(lengths, lengths)
+        inverse = (directions[known].T / singular[known] ** 2) @ directions[known] / np.outer(lengths, lengths)
         spread = state.cost / max(1, jacobian.shape[0] - jacobian.shape[1])
         pull = noise * self._pull(state)
         unit = np.concatenate([self.scale, np.ones(jacobian.shape[1] - p)])
@@ -257,7 +258,9 @@ class _Problem:
         robot = self.robot
         for parameter, value in zip(self.fitted, state.x, strict=True):
             robot = parameter.put(robot, value)
-        identifiable = tuple(bool(s < VAGUE * scale) for s, scale in zip(std[:p], self.scale, strict=True))
+        positive = np.array([parameter.positive for parameter in self.fitted])
+        size = np.where(positive, np.minimum(self.scale, state.x), self.scale)
+        identifiable = tuple(bool(known) for known in std[:p] < VAGUE * size)
         names = tuple(parameter.name for parameter in self.fitted)
         return Calibration(
             names=names,
@@ -273,7 +276,7 @@ class _Problem:
             rms_before=before,
             rms=state.rms,
             joint_noise=noise,
-            condition=float(size[0] / size[-1]) if size[-1] > 0 else np.inf,
+            condition=float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf,
             identifiable=identifiable,
             warning=_warning(names, lost[:p], identifiable),
             converged=converged,
