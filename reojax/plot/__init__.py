@@ -1,4 +1,21 @@
-"""Pictures. The only package that imports matplotlib, and without its global state."""
+"""Pictures. The only package that imports matplotlib, and without its global state.
 
+Functions named `draw_...` draw onto given axes and return them; those named `..._figure` make a figure, and `save`
+and `animation` write files. Robots are drawn from their numbers, see `reojax.plot._solids`.
+"""
+
+from reojax.plot._view import View as View
+from reojax.plot.capture import comparison_figure as comparison_figure
 from reojax.plot.files import FORMATS as FORMATS, check_picture as check_picture, save as save
+from reojax.plot.frames import (
+    Frames as Frames,
+    animate as animate,
+    animation as animation,
+    check_animation as check_animation,
+    draw_frames as draw_frames,
+    frames_along as frames_along,
+    frames_figure as frames_figure,
+)
 from reojax.plot.history import history_figure as history_figure
+from reojax.plot.robots import draw_axes as draw_axes, draw_robot as draw_robot, draw_robot_flat as draw_robot_flat
+from reojax.plot.sweeps import sweep_figure as sweep_figure

@@ -6,6 +6,9 @@ from matplotlib.ticker import FuncFormatter, MultipleLocator
 INK, GREY, PALE = "#222222", "#888888", "#d9d9d9"
 JOINTS = ("#0072b2", "#e69f00", "#56b4e9", "#7f3c8d", "#80ba5a", "#666666")
 """Colours of joints, in order."""
+BASE = "#d55e00"
+LINKS = ("#a9c8de", "#dfe3e6", "#3f7fb5", "#f0c75e")
+"""Colours of links after the base, in order."""
 _SPACINGS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720, 1440, 3600, 7200, 18000)
 
 

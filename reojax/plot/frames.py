@@ -1,0 +1,261 @@
+"""A robot on its way: rows of frames, and animations."""
+
+import io
+import os
+from collections.abc import Sequence
+from pathlib import Path as File
+from typing import NamedTuple, cast
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.axes3d import Axes3D
+from PIL import Image
+
+from reojax._arrays import as_numbers
+from reojax._output import check_writable, replacing
+from reojax.holonomy import rotation_history
+from reojax.path import Path
+from reojax.plot._style import INK
+from reojax.plot._view import View
+from reojax.plot.robots import draw_axes, draw_robot, posed_faces
+from reojax.robot import Robot
+
+
+class Frames(NamedTuple):
+    """Poses of a robot, one after the other."""
+
+    theta: Float[np.ndarray, "m j"]
+    """Joint angles [rad]."""
+    rotation: Float[np.ndarray, "m 3 3"]
+    """Rotation of the base, base components to inertial ones."""
+
+
+def frames_along(robot: Robot, path: Path, *, per_edge: int = 1) -> Frames:
+    """Poses of a robot along a path at zero momentum: at every corner, and `per_edge - 1` between two corners.
+
+    Raises:
+        ValueError: if the path does not fit the robot, or `per_edge` is not a positive integer.
+    """
+    rotation = np.asarray(rotation_history(robot, path, samples=per_edge), float)
+    corners = np.asarray(path.waypoints, float)
+    along = np.arange(len(rotation)) / per_edge
+    knots = np.arange(len(corners))
+    theta = np.stack([np.interp(along, knots, corners[:, k]) for k in range(path.joints)], axis=1)
+    return Frames(theta, rotation)
+
+
+def draw_frames(
+    axes: Sequence[Axes3D],
+    robot: Robot,
+    frames: Frames,
+    *,
+    titles: Sequence[str] | None = None,
+    view: View | None = None,
+) -> Sequence[Axes3D]:
+    """Draw one frame in each of several 3-D axes, all to one scale, with the inertial directions in the first.
+
+    Args:
+        axes: as many 3-D axes as there are frames.
+        robot: the robot.
+        frames: its poses, such as `frames_along` gives.
+        titles: a line above each frame.
+        view: from where to look; default from the front, y up.
+
+    Raises:
+        ValueError: if numbers of axes, frames and titles differ, or a pose does not fit the robot.
+    """
+    frames = _checked(robot, frames)
+    count = len(frames.theta)
+    if len(axes) != count or (titles is not None and len(titles) != count):
+        named = "" if titles is None else f" and {len(titles)} titles"
+        raise ValueError(f"there are {len(axes)} axes{named} for {count} frames; each frame needs its own.")
+    low, high = _extent(robot, frames)
+    for k, place in enumerate(axes):
+        draw_robot(place, robot, frames.theta[k], frames.rotation[k], view=view)
+        _stage(place, low, high)
+        if titles is not None:
+            place.set_title(titles[k], fontsize=9, color=INK, pad=-4)
+    _directions(axes[0], low, high)
+    return axes
+
+
+def frames_figure(
+    robot: Robot,
+    path: Path,
+    *,
+    per_edge: int = 1,
+    title: str | None = None,
+    titles: Sequence[str] | None = None,
+    columns: int | None = None,
+    view: View | None = None,
+) -> Figure:
+    """Draw a robot at the corners of a path, and `per_edge - 1` times between two, as a row of 3-D frames.
+
+    Args:
+        robot: the robot.
+        path: the path in shape space.
+        per_edge: frames per edge.
+        title: above all; default the robot's name.
+        titles: a line above each frame; default where along the path, in edges.
+        columns: frames in one row; default all.
+        view: from where to look; default from the front, y up.
+
+    Raises:
+        ValueError: if the path does not fit the robot, or numbers of frames and titles differ.
+    """
+    frames = frames_along(robot, path, per_edge=per_edge)
+    count = len(frames.theta)
+    if titles is None:
+        titles = [f"edge {k / per_edge:g}" for k in range(count)] if count > 1 else [""]
+    columns = count if columns is None else min(columns, count)
+    rows = -(-count // columns)
+    figure = Figure(figsize=(1.9 * columns, 1.9 * rows + 0.4), facecolor="white")
+    top = 1 - 0.4 / (1.9 * rows + 0.4)
+    axes = figure.subplots(rows, columns, squeeze=False, subplot_kw={"projection": "3d"}).ravel()
+    figure.subplots_adjust(left=0.0, right=1.0, bottom=0.0, top=top - 0.03 / rows, wspace=0.0, hspace=0.08)
+    for spare in axes[count:]:
+        spare.set_axis_off()
+    draw_frames(list(axes[:count]), robot, frames, titles=titles, view=view)
+    figure.suptitle(title or robot.name, x=0.01, y=0.985, ha="left", fontsize=11, fontweight="bold", color=INK)
+    return figure
+
+
+def animation(
+    robot: Robot,
+    path: Path,
+    file: str | os.PathLike[str],
+    *,
+    frames: int = 60,
+    seconds: float = 4.0,
+    titles: Sequence[str] | None = None,
+    view: View | None = None,
+) -> None:
+    """Write a GIF of a robot along a path at zero momentum, every edge equally long; whole or not at all.
+
+    Args:
+        robot: the robot.
+        path: the path in shape space.
+        file: where to, a name that ends in .gif.
+        frames: number of frames, about; every edge has equally many.
+        seconds: how long the path takes. The last frame stays for a second, then it starts again.
+        titles: a name for each edge.
+        view: from where to look; default from the front, y up.
+
+    Raises:
+        ValueError: if the file cannot be written, the path does not fit the robot, or a number is not positive.
+    """
+    target = check_animation(file)
+    if not path.edges:
+        raise ValueError("`path` has one waypoint; an animation needs an edge.")
+    if titles is not None and len(titles) != path.edges:
+        raise ValueError(f"`titles` has {len(titles)} names; the path has {path.edges} edges.")
+    if isinstance(frames, bool) or not isinstance(frames, int) or frames < 1:
+        raise ValueError(f"`frames` is {frames!r}; it must be a positive integer.")
+    per_edge = -(-frames // path.edges)
+    poses = frames_along(robot, path, per_edge=per_edge)
+    names = None
+    if titles is not None:
+        names = [titles[min(k // per_edge, path.edges - 1)] for k in range(len(poses.theta))]
+    animate(robot, poses, target, seconds=seconds, titles=names, view=view)
+
+
+def animate(
+    robot: Robot,
+    frames: Frames,
+    file: str | os.PathLike[str],
+    *,
+    seconds: float = 4.0,
+    titles: Sequence[str] | None = None,
+    view: View | None = None,
+) -> None:
+    """Write a GIF of a robot in given poses, equally spaced in time; whole or not at all.
+
+    Args:
+        robot: the robot.
+        frames: its poses, such as `frames_along` or a simulation gives.
+        file: where to, a name that ends in .gif.
+        seconds: from first to last pose. The last one stays for a second, then it starts again.
+        titles: a line above each frame.
+        view: from where to look; default from the front, y up.
+
+    Raises:
+        ValueError: if the file cannot be written, a pose does not fit the robot, or a number is not positive.
+    """
+    target = check_animation(file)
+    frames = _checked(robot, frames)
+    count = len(frames.theta)
+    if not 0 < seconds < np.inf:
+        raise ValueError(f"`seconds` is {seconds!r}; it must be positive and finite.")
+    if titles is not None and len(titles) != count:
+        raise ValueError(f"`titles` has {len(titles)} lines; there are {count} frames.")
+    low, high = _extent(robot, frames)
+    images = []
+    for k in range(count):
+        figure = Figure(figsize=(3.6, 3.2), dpi=100, facecolor="white")
+        canvas = FigureCanvasAgg(figure)
+        axes = cast(Axes3D, figure.add_axes((0.0, 0.0, 1.0, 0.93), projection="3d"))
+        draw_robot(axes, robot, frames.theta[k], frames.rotation[k], view=view)
+        _stage(axes, low, high)
+        _directions(axes, low, high)
+        if titles is not None:
+            figure.text(0.03, 0.93, titles[k], fontsize=11, color=INK)
+        canvas.draw()
+        image = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
+        images.append(image.quantize(64, dither=Image.Dither.NONE))
+    pause = max(round(1000 * seconds / max(count - 1, 1)), 20)
+    whole = io.BytesIO()
+    images[0].save(
+        whole, "GIF", save_all=True, append_images=images[1:], loop=0, duration=[pause] * (count - 1) + [1000]
+    )
+    with replacing(target) as out:
+        out.write(whole.getvalue())
+
+
+def check_animation(file: str | os.PathLike[str]) -> File:
+    """Return `file` if an animation can be written there now; for asking before a long computation.
+
+    Raises:
+        ValueError: for an ending other than .gif, or a path that cannot be written.
+    """
+    if File(file).suffix.lower() != ".gif":
+        raise ValueError(f"cannot write {str(file)!r}: the name of an animation ends in .gif.")
+    return check_writable(file)
+
+
+def _checked(robot: Robot, frames: Frames) -> Frames:
+    theta, rotation = (np.asarray(as_numbers(name, x), float) for name, x in zip(Frames._fields, frames, strict=True))
+    if theta.ndim != 2 or theta.shape[1] != robot.joints or not len(theta) or not np.isfinite(theta).all():
+        raise ValueError(f"`theta` has shape {theta.shape}; for {robot.name!r} it must be (m, {robot.joints}), finite.")
+    if rotation.shape != (len(theta), 3, 3):
+        raise ValueError(
+            f"`rotation` has shape {rotation.shape}; for {len(theta)} poses it must be {len(theta), 3, 3}."
+        )
+    return Frames(theta, rotation)
+
+
+def _extent(robot: Robot, frames: Frames) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of the box about all frames."""
+    points = [posed_faces(robot, *pose)[0].reshape(-1, 3) for pose in zip(*frames, strict=True)]
+    return np.min([p.min(0) for p in points], axis=0), np.max([p.max(0) for p in points], axis=0)
+
+
+def _stage(axes: Axes3D, low: np.ndarray, high: np.ndarray) -> None:
+    """Show the same space in every frame, without panes or ticks."""
+    middle, half = (low + high) / 2, max(high - low) / 2
+    for limit, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle, strict=True):
+        limit(centre - half, centre + half)
+    axes.set_box_aspect((1, 1, 1), zoom=1.45)  # pyright: ignore[reportArgumentType]  (zoom is a float)
+    axes.set_axis_off()
+
+
+def _directions(axes: Axes3D, low: np.ndarray, high: np.ndarray) -> None:
+    """Draw the inertial directions in the lower left corner of the page; their length is the scale."""
+    camera = View(axes.elev, axes.azim, "xyz"[axes._vertical_axis]).camera()  # pyright: ignore
+    half = max(high - low) / 2
+    decade = 10.0 ** np.floor(np.log10(0.3 * half))
+    length = decade * max(step for step in (1, 2, 5) if step * decade <= 0.3 * half)
+    draw_axes(axes, length, at=(low + high) / 2 + camera.T @ np.array([-0.8 * half, -0.85 * half, 0.0]))
+    text = f"{1000 * length:g} mm" if length < 1 else f"{length:g} m"
+    axes.text2D(0.22, 0.02, f"x, y, z: {text}", transform=axes.transAxes, fontsize=7, color=INK)
