@@ -120,7 +120,7 @@ def _scene(robot: Robot, layout: Layout, letters: str, twist_limit: float, bend_
     """Compute what plans of one robot within one box share, or find it among the last few."""
     leaves, structure = jax.tree.flatten(robot)
     key = (structure, *(np.asarray(leaf).tobytes() for leaf in leaves), layout, letters, twist_limit, bend_limit)
-    key = (*key, jax.config.jax_enable_x64)
+    key = (*key, jax.dtypes.canonicalize_dtype(float))
     if key not in _scenes:
         _scenes[key] = scene(robot, layout, box_of(robot, layout, letters, twist_limit, bend_limit))
         if len(_scenes) > _KEPT:
