@@ -5,6 +5,8 @@ method of sixth order in seven stages (J. C. Butcher, J. Austral. Math. Soc. 4, 
 of each step (H. Munthe-Kaas, Appl. Numer. Math. 29, 1999), so that R stays a rotation to rounding.
 """
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -54,7 +56,7 @@ def orientations(
         h, a, m = inputs
         body = _apply(rotation.T, momentum)
 
-        def stage(slopes: jax.Array, inputs: tuple[Array, Array, Array, Array]) -> tuple[Array, None]:
+        def stage(slopes: jax.Array, inputs: Any) -> tuple[jax.Array, None]:
             index, row, a, m = inputs
             u = h * (row @ slopes)
             omega = a + _apply(m, _apply(so3.exp(-u), body))
@@ -86,3 +88,29 @@ def _apply(matrix: Array, vector: Array) -> Array:
 def step_nodes(samples: int) -> np.ndarray:
     """(samples, 5) shares of a piece at the nodes of its equal steps."""
     return (np.arange(samples)[:, None] + np.array(NODES)) / samples
+
+
+GAUSS = (0.5 - 15**0.5 / 10, 0.5, 0.5 + 15**0.5 / 10)
+"""Shares of a step at which `end_rotation` needs the angular velocity."""
+
+
+def end_rotation(length: Float[Array, " s"], omega: Float[Array, "s 3 3"]) -> Float[Array, "3 3"]:
+    """Rotation from the identity to the end of all steps, of an angular velocity that does not depend on it.
+
+    All steps at once: Magnus's expansion to sixth order (S. Blanes et al., BIT 40, 2000), then their product in pairs.
+
+    Args:
+        length: (s,) durations of the steps [s].
+        omega: (s, 3, 3) angular velocity at the nodes `GAUSS` of each step, one in each row [rad/s].
+    """
+    first, middle, last = (length[:, None] * omega[:, i] for i in range(3))
+    a1, a2, a3 = middle, 15**0.5 / 3 * (last - first), 10 / 3 * (last - 2 * middle + first)
+    c1 = jnp.cross(a2, a1)
+    c2 = -jnp.cross(2 * a3 + c1, a1) / 60
+    vector = a1 + a3 / 12 + jnp.cross(a2 + c2, -20 * a1 - a3 + c1) / 240
+    turn = jax.vmap(so3.exp)(vector)
+    while turn.shape[0] > 1:
+        if turn.shape[0] % 2:
+            turn = jnp.concatenate([turn, jnp.eye(3, dtype=turn.dtype)[None]])
+        turn = jnp.matmul(turn[::2], turn[1::2], precision="highest")
+    return turn[0]

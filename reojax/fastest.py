@@ -5,22 +5,23 @@ with every motor within its torque-speed curve and every joint within its limits
 held where it is wanted. Answers are local optima near their starts.
 """
 
+import sys
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
+from tqdm import tqdm
 
 from reojax import so3
 from reojax._arrays import Array, as_numbers
-from reojax.design.solver import optimise
 from reojax.dynamics import joint_load
 from reojax.holonomy import net_rotation
 from reojax.minimum_time import instants, minimum_stretch, minimum_time
-from reojax.motion import orientation_along
+from reojax.motion import net_rotation_of, orientation_along
 from reojax.motor import Motor, check_motors, demand, no_load_speed, per_joint, stall_torque
 from reojax.path import Path
 from reojax.robot import Robot
@@ -235,15 +236,16 @@ def _fastest(
         return jnp.concatenate([asked, *past, task.order(x) / scale[0]])
 
     def miss(x: Array) -> Array:
-        rotation = orientation_along(robot, task.build(x), jnp.zeros(3), _SAMPLES)[0][-1]
-        return so3.log(jnp.asarray(task.goal).T @ rotation)
+        return so3.log(jnp.asarray(task.goal).T @ net_rotation_of(robot, task.build(x), _SAMPLES))
 
-    found = optimise(
-        task.cost, np.clip(starts, lower, upper), lower=lower, upper=upper, scale=scale,
-        equality=None if task.goal is None else miss, inequality=within,
-        tolerance=1e-7, slope_tolerance=1e-4, max_steps=max_steps, progress=progress,
-    )  # fmt: skip
-    trajectory = task.build(jnp.asarray(found.value[found.best]))
+    def everything(unit: Array) -> Array:
+        x = unit * scale
+        return jnp.concatenate([task.cost(x)[None], jnp.zeros(0) if task.goal is None else miss(x), -within(x)])
+
+    best, converged = _least(
+        everything, 0 if task.goal is None else 3, starts, (lower, upper, scale), max_steps, progress
+    )
+    trajectory = task.build(jnp.asarray(best))
     trajectory = stretched(trajectory, minimum_stretch(task.robot, trajectory, task.motors))
     finer = jax.jit(lambda trajectory: orientation_along(robot, trajectory, jnp.zeros(3), 4 * _SAMPLES))
     rotation, _, state = finer(trajectory)
@@ -254,8 +256,56 @@ def _fastest(
         duration=trajectory.duration,
         error=so3.angle(wanted.T @ rotation[-1]),
         beyond=jnp.maximum(past, 0),
-        converged=jnp.asarray(found.converged[found.best]),
+        converged=jnp.asarray(converged),
     )
+
+
+def _least(
+    everything: Callable[[Array], Array],
+    equalities: int,
+    starts: np.ndarray,
+    box: tuple[np.ndarray, np.ndarray, np.ndarray],
+    max_steps: int,
+    progress: str | None,
+) -> tuple[np.ndarray, bool]:
+    """Least first number of `everything` with the next `equalities` zero and the rest not negative (SciPy's SLSQP).
+
+    One small program with all derivatives is compiled, where the batched solver of `design` would compile for minutes.
+    """
+    from scipy.optimize import minimize
+
+    lower, upper, scale = box
+    program = jax.jit(lambda x: (everything(x), jax.jacfwd(everything)(x)))
+    known: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+
+    def at(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        key = x.tobytes()
+        if key not in known:
+            known.clear()
+            value, slope = program(x)
+            known[key] = np.asarray(value), np.asarray(slope)
+        return known[key]
+
+    def part(kind: str, rows: slice) -> dict[str, Any]:
+        return {"type": kind, "fun": lambda x: at(x)[0][rows], "jac": lambda x: at(x)[1][rows]}
+
+    constraints = [part("ineq", slice(1 + equalities, None))]
+    if equalities:
+        constraints.append(part("eq", slice(1, 1 + equalities)))
+    found = []
+    total = max_steps * len(starts)
+    with tqdm(total=total, desc=progress, unit="step", file=sys.stderr, disable=progress is None) as bar:
+        for start in starts:
+            answer = minimize(
+                lambda x: at(x)[0][0], start / scale, jac=lambda x: at(x)[1][0], method="SLSQP",
+                bounds=list(zip(lower / scale, upper / scale, strict=True)), constraints=constraints,
+                options={"maxiter": max_steps, "ftol": 1e-7}, callback=lambda _: bar.update(1),
+            )  # fmt: skip
+            value = at(answer.x)[0]
+            off = max(np.abs(value[1 : 1 + equalities]).max(initial=0), -value[1 + equalities :].min(initial=0))
+            found.append((not (answer.success and off < 1e-5), value[0] if off < 1e-4 else np.inf, answer.x * scale))
+    failed, _, best = min(found, key=lambda item: item[:2])
+    return best, not failed
 
 
 def _limit(robot: Robot, joint: int, sign: int) -> float:

@@ -15,9 +15,9 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._arrays import Array, as_numbers, common_float, is_concrete
-from reojax._lie import orientations, step_nodes
+from reojax._lie import GAUSS, end_rotation, orientations, step_nodes
 from reojax._smallmat import solve_symmetric3
-from reojax.dynamics import Load, joint_load
+from reojax.dynamics import Load, base_velocity, joint_load
 from reojax.momentum import momentum_matrices
 from reojax.motor import Motor, check_motors, drive, per_joint
 from reojax.path import Path
@@ -170,3 +170,14 @@ def orientation_along(
 
 def _samples(nodes: Array) -> Array:
     return jnp.concatenate([nodes[:, 0], nodes[-1:, -1]])
+
+
+def net_rotation_of(robot: Robot, trajectory: Trajectory, samples: int) -> Float[Array, "3 3"]:
+    """Net rotation of a trajectory at zero momentum, by `samples` steps of each piece, all at once."""
+    length = jnp.diff(trajectory.breaks)
+    shares = jnp.asarray((np.arange(samples)[:, None] + np.array(GAUSS)) / samples, length.dtype)
+    within = shares[None] * length[:, None, None]
+    state = jax.vmap(jax.vmap(jax.vmap(polynomial, (None, 0)), (None, 0)))(trajectory.coefficients, within)
+    theta, rate = (leaf.reshape(-1, robot.joints) for leaf in state[:2])
+    omega = jax.vmap(lambda theta, rate: base_velocity(robot, theta, rate))(theta, rate)
+    return end_rotation(jnp.repeat(length / samples, samples), omega.reshape(-1, 3, 3))

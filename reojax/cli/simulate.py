@@ -1,12 +1,16 @@
-"""Run a manoeuvre; print how far the robot turns, and how sure that is."""
+"""Run a manoeuvre; print how far the robot turns, and how sure that is; with `--duration`, what it takes."""
 
 import argparse
 import json
 from typing import TYPE_CHECKING, Any
 
-from reojax.cli._arguments import BadInput, degrees, version
+from reojax.cli._arguments import BadInput, version
+from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, path_of
+from reojax.cli._motion import LAW, check_law, motion_of, motion_report, motion_text
+from reojax.cli._motors import add_motors, seconds
 
 if TYPE_CHECKING:
+    from reojax.motion import Motion
     from reojax.path import Path
     from reojax.robot import Robot
 
@@ -16,12 +20,11 @@ _RESOLVED = 270.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `reojax simulate`."""
+    add_manoeuvre(parser)
+    add_motors(parser, law=None)
     add = parser.add_argument
-    parts = "a: the distal joints twist opposite ways; b: the same way [%(default)s]"
-    add("--manoeuvre", choices=("a", "b"), default="a", help=parts)
-    add("--twist", type=degrees, default=270.0, metavar="DEG", help="twist of the distal joints [%(default)g]")
-    add("--bend", type=degrees, default=120.0, metavar="DEG", help="bend of the centre joint [%(default)g]")
-    add("--robot", default="prototype", metavar="NAME", help="robot; a wrong name lists them [%(default)s]")
+    share = "by the angle that its farthest joint goes"
+    add("--duration", type=seconds, metavar="S", help=f"run it in this time, which the edges share {share}")
     add("--json", action="store_true", help="print one JSON object, with all digits")
     add("--out", metavar="FIGURE", help="draw orientation and joint angles to a .png, .pdf or .svg")
 
@@ -33,29 +36,19 @@ def run(args: argparse.Namespace) -> None:
     _session.start()
     try:
         robot = robots.by_name(args.robot)
-        path = _path(robot, args)
+        path = path_of(robot, args)
+        check_law(args)
         if args.out is not None:
             _check_picture(args.out)
+        motion = motion_of(robot, path, args)
         report, history = _report(robot, path, args)
+        if motion is not None:
+            report["motion"] = motion_report(robot, motion, args)
         if args.out is not None:
-            _draw(robot, path, history, args)
+            _draw(robot, path, history, motion, args)
     except ValueError as error:
         raise BadInput(f"reojax simulate: {error}") from error
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(report, args))
-
-
-def _path(robot: "Robot", args: argparse.Namespace) -> "Path":
-    import numpy as np
-
-    from reojax.manoeuvres import layout_for, manoeuvre_a, manoeuvre_b
-
-    manoeuvre = {"a": manoeuvre_a, "b": manoeuvre_b}[args.manoeuvre]
-    return manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), layout_for(robot))
-
-
-def _heading(args: argparse.Namespace) -> str:
-    angles = f"twist {args.twist:g} deg, bend {args.bend:g} deg"
-    return f"Manoeuvre {args.manoeuvre.upper()} on {args.robot}: {angles}"
 
 
 def _check_picture(out: str) -> None:
@@ -64,15 +57,14 @@ def _check_picture(out: str) -> None:
     plot.check_picture(out)
 
 
-def _draw(robot: "Robot", path: "Path", history: Any, args: argparse.Namespace) -> None:
+def _draw(robot: "Robot", path: "Path", history: Any, motion: "Motion | None", args: argparse.Namespace) -> None:
     from reojax import plot
-    from reojax.manoeuvres import layout_for
 
-    names = ("bend", "twist", "unbend", "untwist")
-    if layout_for(robot).fold is not None:
-        names = ("fold", *names, "unfold")
-    title = _heading(args).replace(" deg", "°").replace(" -", " \u2212")
-    figure = plot.history_figure(robot, path, title=title, edge_names=names, rotations=history)
+    title = heading(args).replace(" deg", "°").replace(" -", " \u2212")
+    if motion is None:
+        figure = plot.history_figure(robot, path, title=title, edge_names=edge_names(robot), rotations=history)
+    else:
+        figure = plot.motion_figure(robot, motion, title=f"{title}, {args.law or LAW}")
     plot.save(figure, args.out)
 
 
@@ -135,7 +127,7 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
 
 def _text(report: dict[str, Any], args: argparse.Namespace) -> str:
     lines = [
-        _heading(args),
+        heading(args),
         "",
         "net rotation of the base",
         _row("rotation vector", ["x", "y", "z"], report["rotation_vector_deg"], "deg"),
@@ -161,6 +153,8 @@ def _text(report: dict[str, Any], args: argparse.Namespace) -> str:
         lines.append(f"  {label:<19}{figures[key]:>9.1e} {unit:<5}{meaning}")
     if report["joints_beyond_limits"]:
         lines += ["", f"beyond the joint limits of {args.robot}: {', '.join(report['joints_beyond_limits'])}"]
+    if "motion" in report:
+        lines += motion_text(report["motion"])
     if report["picture"] is not None:
         lines += ["", f"picture in {report['picture']}"]
     return "\n".join(lines)

@@ -37,7 +37,7 @@ def torque_speed_figure(
     Raises:
         ValueError: if a motion has no motors.
     """
-    figure = Figure(figsize=(4.6 * min(len(runs), 2) + 0.6, 4.1 * -(-len(runs) // 2) + 0.5), layout="constrained")
+    figure = Figure(figsize=(9.0 if len(runs) > 1 else 7.2, 4.1 * -(-len(runs) // 2) + 0.5), layout="constrained")
     panels = figure.subplots(-(-len(runs) // 2), min(len(runs), 2), squeeze=False, sharex=True, sharey=True)
     shown = range(len(joint_names)) if joints is None else joints
     k, resistance, supply = (float(np.ravel(x)[0]) for x in (motor.torque_constant, motor.resistance, motor.supply))
@@ -73,7 +73,7 @@ def torque_speed_figure(
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False, fontsize=9.5, labelcolor=INK)
     if title:
-        figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold", color=INK)
+        figure.suptitle(title, x=0.01, ha="left", fontsize=11.5, fontweight="bold", color=INK)
     return figure
 
 

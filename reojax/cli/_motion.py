@@ -1,0 +1,91 @@
+"""What `reojax simulate` adds when a duration is given: the manoeuvre by time, and what it takes of the motors."""
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from reojax.cli._motors import motor_at
+
+if TYPE_CHECKING:
+    from reojax.motion import Motion
+    from reojax.path import Path
+    from reojax.robot import Robot
+
+LAW = "quintic"
+"""The law where only a duration is given."""
+RPM = 9.549296585513721
+"""Turns per minute in one rad/s."""
+
+
+def check_law(args: argparse.Namespace) -> None:
+    """Refuse a time law that there is none of, or that has no time.
+
+    Raises:
+        ValueError: saying so.
+    """
+    from reojax.time_law import by_name
+
+    if args.law is not None:
+        by_name(args.law)
+        if args.duration is None:
+            raise ValueError("argument --law: a time law needs a --duration")
+
+
+def motion_of(robot: "Robot", path: "Path", args: argparse.Namespace) -> "Motion | None":
+    """The manoeuvre by time, if a duration is given.
+
+    Raises:
+        ValueError: if nothing moves, or the motors do not fit the robot.
+    """
+    import numpy as np
+
+    from reojax.motion import simulate
+
+    if args.duration is None:
+        return None
+    angles = np.abs(np.diff(path.waypoints, axis=0)).max(axis=1)
+    if not angles.sum() > 0:
+        raise ValueError("nothing moves: every edge of the manoeuvre stays put.")
+    durations = args.duration * angles / angles.sum()
+    return simulate(robot, path, args.law or LAW, durations=durations, motors=motor_at(args.supply))
+
+
+def motion_report(robot: "Robot", motion: "Motion", args: argparse.Namespace) -> dict[str, Any]:
+    """What the motion takes, joint by joint, as plain numbers."""
+    import numpy as np
+
+    from reojax import so3
+
+    def peaks(values: Any) -> list[float]:
+        return np.abs(np.asarray(values)).max(axis=0).tolist()
+
+    margin = np.asarray(motion.margin)
+    return {
+        "law": args.law or LAW,
+        "duration_s": float(motion.time[-1]),
+        "supply_V": args.supply,
+        "rotation_vector_deg": np.rad2deg(np.asarray(so3.log(motion.rotation[-1]))).tolist(),
+        "joints": list(robot.joint_names),
+        "peak_rate_rad_s": peaks(motion.theta_dot),
+        "peak_torque_Nm": peaks(motion.torque),
+        "peak_motor_speed_rad_s": peaks(motion.motor_speed),
+        "peak_current_A": peaks(motion.current),
+        "least_margin": margin.min(axis=0).tolist(),
+        "least_margin_at_s": np.asarray(motion.time)[margin.argmin(axis=0)].tolist(),
+        "possible": bool(margin.min() >= 0),
+    }
+
+
+def motion_text(motion: dict[str, Any]) -> list[str]:
+    """Lines of `motion_report`."""
+    lines = [
+        "",
+        f"in {motion['duration_s']:g} s, {motion['law']}, {motion['supply_V']:g} V",
+        "  joint         peak rate       torque  motor speed    current   margin",
+    ]
+    columns = ("peak_rate_rad_s", "peak_torque_Nm", "peak_motor_speed_rad_s", "peak_current_A", "least_margin")
+    for k, name in enumerate(motion["joints"]):
+        rate, torque, speed, current, margin = (motion[column][k] for column in columns)
+        cells = f"{rate:>9.2f} rad/s{torque:>9.4f} N m{speed * RPM:>9.0f} rpm{current:>9.3f} A{margin:>9.3f}"
+        lines.append(f"  {name:<8}{cells} at {1000 * motion['least_margin_at_s'][k]:.0f} ms")
+    verdict = "the motors can do it" if motion["possible"] else "beyond the motors: a margin is negative"
+    return [*lines, f"  {verdict} (margin: share of the supply that is left where it is least)"]
