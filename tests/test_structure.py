@@ -43,6 +43,7 @@ LAYERS = [
     ["plan.chain", "plan.library"],
     ["plan.search"],
     ["plan.attempts"],
+    ["plan.grouped"],
     ["plan.decide", "plan.result"],
     ["plan"],
     ["_lie", "_spline", "dynamics"],
