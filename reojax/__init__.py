@@ -2,6 +2,7 @@
 
 from reojax import robots as robots, so3 as so3
 from reojax.certificate import Certificate as Certificate, certify as certify
+from reojax.curvature import curvature as curvature
 from reojax.holonomy import net_rotation as net_rotation, rotation_history as rotation_history
 from reojax.manoeuvres import (
     FOUR_BODY as FOUR_BODY,

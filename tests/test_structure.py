@@ -18,7 +18,7 @@ LAYERS = [
     ["_fast.omega", "_fast.steps"],
     ["_fast.momentum"],
     ["_fast.endpoint"],
-    ["holonomy"],
+    ["holonomy", "curvature"],
     ["robots._solids"],
     ["robots.prototype", "robots.planar", "robots.two_cylinder_cat"],
     ["robots.six_body"],
