@@ -42,7 +42,7 @@ LAYERS = [
     ["control", "calibrate"],
     ["plot._style", "plot.files", "plot._view", "plot._solids"],
     ["plot.history", "plot.robots"],
-    ["plot.frames"],
+    ["plot.frames", "plot.maps"],
     ["plot"],
     ["cli._arguments"],
     ["cli.simulate"],
