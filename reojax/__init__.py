@@ -18,3 +18,4 @@ from reojax.momentum import (
 )
 from reojax.path import Path as Path, joint_travel as joint_travel, polygon as polygon
 from reojax.robot import Robot as Robot, make_robot as make_robot
+from reojax.sweep import Sweep as Sweep, sweep as sweep, zipped as zipped
