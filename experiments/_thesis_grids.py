@@ -96,7 +96,13 @@ def sweeps(*, quick: bool) -> dict[str, Grid]:
     }
     names = {"a": ("twist", "bend"), "b": ("twist", "bend"), "inertia": ("inertia",), "motor": ("ratio", "rotor")}
     columns: dict[str, list[np.ndarray]] = {key: [] for key in ("twist", "bend", "last", "inertia", "ratio", "rotor")}
-    usual = {"twist": FULL_TWIST, "bend": FULL_BEND, "inertia": END_INERTIA, "ratio": GEAR_RATIO, "rotor": ROTOR_INERTIA}
+    usual = {
+        "twist": FULL_TWIST,
+        "bend": FULL_BEND,
+        "inertia": END_INERTIA,
+        "ratio": GEAR_RATIO,
+        "rotor": ROTOR_INERTIA,
+    }
     shapes = {}
     for key, values in axes.items():
         mesh = dict(zip(names[key], np.meshgrid(*values, indexing="ij"), strict=True))
@@ -115,7 +121,10 @@ def sweeps(*, quick: bool) -> dict[str, Grid]:
 
 def run(designs: dict[str, np.ndarray]) -> Turn:
     """Run a list of designs, columns by the names of `outcome`'s arguments."""
-    return jax.tree.map(np.asarray, _batch(*(designs[name] for name in outcome.__annotations__ if name in designs)))
+    done = reojax.sweep(outcome, reojax.zipped(designs))
+    if done.bad:
+        raise ValueError(f"{len(done.bad)} designs failed, the first is {done.bad[0]}.")
+    return done.results
 
 
 def axis_of(rotations: np.ndarray) -> np.ndarray:
@@ -124,5 +133,4 @@ def axis_of(rotations: np.ndarray) -> np.ndarray:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-_batch = jax.jit(jax.vmap(outcome))
 _logs = jax.jit(jax.vmap(so3.log))
