@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, cast
 import jax
 import jax.numpy as jnp
 import numpy as np
+from _thesis_grids import net
 from jaxtyping import Float
 from numpy.polynomial import chebyshev, legendre
 from scipy.optimize import least_squares
@@ -174,6 +175,58 @@ def mean_size(gamma: np.ndarray, weight: np.ndarray) -> float:
     return float(np.sqrt(weight @ (gamma**2).sum((1, 2)) / weight.sum()))
 
 
-def predicted(form: Vectors, weight: np.ndarray) -> np.ndarray:
-    """Net rotation by the surface integral of the curvature."""
-    return Rotation.from_rotvec(weight @ form).as_matrix()
+class Map(NamedTuple):
+    """Curvature over a plane, in a frame."""
+
+    frame: str
+    bend: np.ndarray
+    """(b,) [rad]."""
+    twist: np.ndarray
+    """(t,) [rad]."""
+    form: Float[np.ndarray, "t b 3"]
+    """F(bend, twist) [rad/rad^2]."""
+
+
+class Errors(NamedTuple):
+    """How well the surface integral predicts loops of several sizes."""
+
+    size: np.ndarray
+    """(s,) share of the full amplitudes, 270 and 120 degrees."""
+    angle: np.ndarray
+    """(s,) of the net rotation [rad]."""
+    frames: tuple[str, ...]
+    """Names of f frames."""
+    miss: np.ndarray
+    """(f, s) angle between prediction and net rotation [rad]."""
+    mean: dict[str, float]
+    """Root mean square of the connection over the largest loop's plane, by frame [rad/rad]."""
+
+
+NAMES = ("base frame", "between middle links", "minimum perturbation")
+
+
+def study(robot: reojax.Robot, last: float, sizes: np.ndarray, reach: tuple[float, float], *, quick: bool) -> tuple:
+    """Maps of the curvature, and errors of its integral for loops up to `reach` (bend, twist)."""
+    points, weight = nodes(*reach)
+    whole = plane(robot, last, points)
+    frames = dict(zip(NAMES, (None, MIDDLE, smallest(robot, whole, weight, degree=6)), strict=True))
+    sides = [np.linspace(0, side, count) for side, count in zip(reach, (13, 19) if quick else (31, 55), strict=True)]
+    mesh = plane(robot, last, np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, 2))
+    shape = (len(sides[0]), len(sides[1]), 3)
+    bend, twist = sides
+    maps = [
+        Map(name, bend, twist, seen(robot, mesh, frames[name]).form.reshape(shape).swapaxes(0, 1))
+        for name in NAMES[::2]
+    ]
+    angle, miss = np.zeros(len(sizes)), np.zeros((len(NAMES), len(sizes)))
+    for i, size in enumerate(sizes):
+        points, weights = nodes(size * reach[0], size * reach[1])
+        local = plane(robot, last, points)
+        corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]) * size * reach @ directions(last).T
+        exact = net(robot, reojax.Path(corners))
+        angle[i] = exact.magnitude()
+        for k, frame in enumerate(frames.values()):
+            guess = Rotation.from_rotvec(weights @ seen(robot, local, frame).form)
+            miss[k, i] = (guess.inv() * exact).magnitude()
+    mean = {name: mean_size(seen(robot, whole, frame).gamma, weight) for name, frame in frames.items()}
+    return maps, Errors(sizes, angle, NAMES, miss, mean)

@@ -6,9 +6,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 import reojax
-from reojax import robots, so3
+from reojax import robots
+from reojax._arrays import Array
 from reojax.robots.prototype import END_INERTIA, GEAR_RATIO, ROTOR_INERTIA
 
 TWISTS = np.deg2rad([0, 67.5, 135, 202.5, 270])  # rad, thesis figures 2.7 and 2.10
@@ -16,6 +18,7 @@ BENDS = np.deg2rad([0.0, 30, 60, 90, 120])  # rad
 INERTIAS = np.array([10.0, 40, 70, 100, 130, 160, 190]) * 1e-6  # kg m^2, thesis figure 2.8
 RATIOS = np.array([1.0, 12, 24, 36, 48])  # thesis figure 2.9
 ROTORS = END_INERTIA / np.array([1400, 700, 350, 175, 87.5])  # kg m^2
+LINE = np.deg2rad(np.linspace(0.0, 270, 181))  # rad, twists at full bend
 FULL_TWIST, FULL_BEND = TWISTS[-1], BENDS[-1]
 FINE = {False: {"a": 12, "b": 12, "inertia": 15, "motor": 6}, True: {"a": 2, "b": 2, "inertia": 3, "motor": 2}}
 """Steps of the fine grids in one of the thesis's, by `quick`."""
@@ -94,7 +97,9 @@ def sweeps(*, quick: bool) -> dict[str, Grid]:
         "inertia": (finer(INERTIAS, step["inertia"]),),
         "motor": (finer(RATIOS, step["motor"]), finer(ROTORS, step["motor"], ratio=True)),
     }
+    axes |= {"line_a": (LINE,), "line_b": (LINE,)}
     names = {"a": ("twist", "bend"), "b": ("twist", "bend"), "inertia": ("inertia",), "motor": ("ratio", "rotor")}
+    names |= {"line_a": ("twist",), "line_b": ("twist",)}
     columns: dict[str, list[np.ndarray]] = {key: [] for key in ("twist", "bend", "last", "inertia", "ratio", "rotor")}
     usual = {
         "twist": FULL_TWIST,
@@ -107,14 +112,14 @@ def sweeps(*, quick: bool) -> dict[str, Grid]:
     for key, values in axes.items():
         mesh = dict(zip(names[key], np.meshgrid(*values, indexing="ij"), strict=True))
         shapes[key] = tuple(map(len, values))
-        for column, chosen in ({**usual, "last": 1.0 if key == "b" else -1.0} | mesh).items():
+        for column, chosen in ({**usual, "last": 1.0 if key in ("b", "line_b") else -1.0} | mesh).items():
             columns[column].append(np.broadcast_to(chosen, shapes[key]).ravel())
     turns = run({column: np.concatenate(parts) for column, parts in columns.items()})
     grids, start = {}, 0
     for key, shape in shapes.items():
         part = slice(start, start + int(np.prod(shape)))
         own = jax.tree.map(lambda field, part=part, shape=shape: field[part].reshape(*shape, *field.shape[1:]), turns)
-        grids[key] = Grid(axes[key], step[key], own)
+        grids[key] = Grid(axes[key], step.get(key, 1), own)
         start = part.stop
     return grids
 
@@ -127,10 +132,11 @@ def run(designs: dict[str, np.ndarray]) -> Turn:
     return done.results
 
 
-def axis_of(rotations: np.ndarray) -> np.ndarray:
-    """(m, 3) unit rotation axes of rotations (m, 3, 3)."""
-    vectors = np.asarray(_logs(rotations))
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+@jax.jit
+def _net(robot: reojax.Robot, corners: jax.Array) -> Array:
+    return reojax.net_rotation(robot, reojax.Path(corners))  # the robot is data, so that many share one program
 
 
-_logs = jax.jit(jax.vmap(so3.log))
+def net(robot: reojax.Robot, path: reojax.Path) -> Rotation:
+    """Net rotation of a robot after a path."""
+    return Rotation.from_matrix(np.asarray(_net(robot, np.asarray(path.waypoints, float))))

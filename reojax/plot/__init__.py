@@ -20,5 +20,10 @@ from reojax.plot.history import (
     draw_orientation as draw_orientation,
     history_figure as history_figure,
 )
-from reojax.plot.maps import draw_lines as draw_lines, draw_map as draw_map, draw_poses as draw_poses
+from reojax.plot.maps import (
+    draw_lines as draw_lines,
+    draw_loop as draw_loop,
+    draw_map as draw_map,
+    draw_poses as draw_poses,
+)
 from reojax.plot.robots import draw_axes as draw_axes, draw_robot as draw_robot, draw_robot_flat as draw_robot_flat

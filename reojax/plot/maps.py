@@ -24,20 +24,22 @@ def draw_map(
     y: ArrayLike,
     values: ArrayLike,
     *,
-    label: str,
+    label: str | None,
     diverging: bool = False,
     levels: int | Sequence[float] = 10,
 ) -> Axes:
     """Draw values over a grid as filled contours with a bar beside them.
+
+    The filled contours are the last but one of `axes.collections`, for a bar of your own.
 
     Args:
         axes: flat axes.
         x: (c,) grid along x, in the units to be shown.
         y: (r,) grid along y.
         values: (r, c) values, finite.
-        label: of the bar, with unit.
+        label: of the bar, with unit; None for no bar.
         diverging: values have a sign; colours are symmetric about zero.
-        levels: number of contours, or the values on which they lie.
+        levels: number of contours, or the values on which they lie, for maps that are compared.
 
     Raises:
         ValueError: if the shapes do not go together, or a value is not finite.
@@ -49,17 +51,40 @@ def draw_map(
         raise ValueError("`values` must be finite everywhere.")
     style: dict[str, Any] = {"cmap": "cividis"}
     if diverging:
-        size = max(np.abs(z).max(), 1e-300)
+        size = max(np.abs(z if isinstance(levels, int) else levels).max(), 1e-300)
         style = {"cmap": "PuOr", "vmin": -size, "vmax": size}
     if np.ptp(z) <= 1e-9 * max(np.abs(z).max(), 1.0):
         levels = np.array([-1.0, 1.0]) * max(np.abs(z).max(), 1.0)
     filled = axes.contourf(columns, rows, z, levels, **style)
     thin = axes.contour(columns, rows, z, filled.levels, colors=INK, linewidths=0.4, alpha=0.7)
     thin.set_linestyle("solid")
-    bar = axes.figure.colorbar(filled, ax=axes, shrink=0.95, pad=0.03)
-    bar.set_label(label, color=INK)
-    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]  (a spine)
+    if label is not None:
+        bar = axes.figure.colorbar(filled, ax=axes, shrink=0.95, pad=0.03)
+        bar.set_label(label, color=INK)
+        bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]  (a spine)
     axes.tick_params(colors=INK, color=GREY)
+    return axes
+
+
+def draw_loop(axes: Axes, corners: ArrayLike, *, label: str | None = None) -> Axes:
+    """Draw a path in a plane of shape space over a map of it, with an arrow on every edge.
+
+    Args:
+        axes: flat axes.
+        corners: (v, 2) in the units shown.
+        label: a name, for a legend.
+
+    Raises:
+        ValueError: if the shape of `corners` is another.
+    """
+    points = np.asarray(corners, float)
+    if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
+        raise ValueError(f"`corners` has shape {points.shape}; it must be (v, 2), two or more.")
+    axes.plot(*points.T, color=INK, linewidth=1.6, label=label, clip_on=False)
+    for start, end in zip(points, points[1:], strict=False):
+        tail, head = start + 0.48 * (end - start), start + 0.56 * (end - start)
+        arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.6, "mutation_scale": 12}
+        axes.annotate("", tuple(head), tuple(tail), arrowprops=arrow, annotation_clip=False)
     return axes
 
 
@@ -134,15 +159,15 @@ def draw_poses(
     seen = [
         posed_faces(r, pose, turn)[0] @ view.camera().T for r, turn in zip(each, turns.reshape(-1, 3, 3), strict=True)
     ]
-    scale = 0.46 / max(np.abs(points[..., :2]).max() for points in seen)
+    scale = 0.42 / max(np.abs(points[..., :2]).max() for points in seen)
     for k, (robot, turn) in enumerate(zip(each, turns.reshape(-1, 3, 3), strict=True)):
         row, column = divmod(k, len(columns))
         draw_robot_flat(axes, robot, pose, turn, at=(column, row), scale=scale, view=view)
         if texts is not None:
-            axes.text(column, row - 0.44, texts[row][column], fontsize=7.5, color=INK, ha="center", va="center")
+            axes.text(column, row - 0.47, texts[row][column], fontsize=7.5, color=INK, ha="center", va="center")
     axes.set_aspect("equal")
     axes.set_xlim(-0.55, len(columns) - 0.45)
-    axes.set_ylim(-0.55, len(rows) - 0.45)
+    axes.set_ylim(-0.58, len(rows) - 0.45)
     axes.set_xticks(range(len(columns)), columns)
     axes.set_yticks(range(len(rows)), rows)
     axes.tick_params(length=0, colors=INK)
