@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, cast
 import jax
 import jax.numpy as jnp
 import numpy as np
-from _thesis_grids import net
+from _thesis_grids import ONCE, net
 from jaxtyping import Float
 from numpy.polynomial import chebyshev, legendre
 from scipy.optimize import least_squares
@@ -66,7 +66,7 @@ def plane(robot: reojax.Robot, last: float, points: Float[np.ndarray, "m 2"]) ->
     return Plane(points, *(np.concatenate(field)[: len(points)] for field in zip(*parts, strict=True)))
 
 
-@jax.jit
+@partial(jax.jit, compiler_options=ONCE)
 @partial(jax.vmap, in_axes=(None, None, 0))
 def _local(robot: reojax.Robot, across: jax.Array, point: jax.Array) -> tuple:
     theta = across @ point
@@ -119,7 +119,7 @@ def _turned(v: jax.Array, slope: jax.Array, gamma: jax.Array) -> Array:
 
 
 _seen = jax.jit(jax.vmap(_turned))
-_slopes = jax.jit(jax.vmap(jax.jacfwd(_turned, (0, 1))))
+_slopes = jax.jit(jax.vmap(jax.jacfwd(_turned, (0, 1))), compiler_options=ONCE)
 _exp = jax.jit(jax.vmap(so3.exp))
 
 

@@ -1,5 +1,6 @@
 """The thesis's sweeps (figures 1.5 and 2.7 to 2.10) on its own grids and on finer ones that hold them."""
 
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -19,6 +20,8 @@ INERTIAS = np.array([10.0, 40, 70, 100, 130, 160, 190]) * 1e-6  # kg m^2, thesis
 RATIOS = np.array([1.0, 12, 24, 36, 48])  # thesis figure 2.9
 ROTORS = END_INERTIA / np.array([1400, 700, 350, 175, 87.5])  # kg m^2
 LINE = np.deg2rad(np.linspace(0.0, 270, 181))  # rad, twists at full bend
+ONCE = {"xla_backend_optimization_level": 0}
+"""For programs that run too briefly to be worth a long compilation."""
 FULL_TWIST, FULL_BEND = TWISTS[-1], BENDS[-1]
 FINE = {False: {"a": 12, "b": 12, "inertia": 15, "motor": 6}, True: {"a": 2, "b": 2, "inertia": 3, "motor": 2}}
 """Steps of the fine grids in one of the thesis's, by `quick`."""
@@ -132,7 +135,7 @@ def run(designs: dict[str, np.ndarray]) -> Turn:
     return done.results
 
 
-@jax.jit
+@partial(jax.jit, compiler_options=ONCE)
 def _net(robot: reojax.Robot, corners: jax.Array) -> Array:
     return reojax.net_rotation(robot, reojax.Path(corners))  # the robot is data, so that many share one program
 

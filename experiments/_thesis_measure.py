@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import reojax
 from reojax import robots
-from reojax._orientation import continued_zxz
+from reojax._orientation import zxz_without_jumps
 from reojax.robots.prototype import END_INERTIA, GEAR_RATIO, ROTOR_INERTIA
 
 SEED = 2019
@@ -238,7 +238,7 @@ def _nearest(found: Rotation, before: Rotation, targets: Rotation) -> np.ndarray
 
 def history(rotations: np.ndarray) -> Numbers:
     """Figure 1.9: where the first and third ZXZ angle end, continued along A."""
-    first, _, third = np.rad2deg(continued_zxz(rotations)[-1])
+    first, _, third = np.rad2deg(zxz_without_jumps(rotations)[-1])
     return {"a_first_zxz_deg": first, "a_third_zxz_deg": third}
 
 

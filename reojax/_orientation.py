@@ -22,29 +22,58 @@ def tilt_and_roll(rotations: Float[Array, "m 3 3"]) -> Float[np.ndarray, "m 3"]:
     return np.stack([-y * factor, x * factor, roll], axis=1)
 
 
-def continued_zxz(rotations: Float[Array, "m 3 3"]) -> Float[np.ndarray, "m 3"]:
-    """ZXZ angles (a, b, c) [rad] along a history of rotations, `R = Rz(a) Rx(b) Rz(c)`, told without jumps.
+LEVEL = 0.1
+"""Tilt [rad] below which the first and the third ZXZ angle count as undefined one by one; their sum is not."""
 
-    (a, b, c) and (a + pi, -b, c + pi) are one rotation: of these, and of their full turns, each sample takes what is
-    nearest to the one before, so b may change its sign and a and c go on beyond a half turn. The first b that is not
-    zero is entered with a between -pi/2 and pi/2. Where b is zero only a + c means anything; a then stays. Close to
-    it a and c turn fast, against each other, and only b and a + c can be compared.
+
+def zxz_without_jumps(rotations: Float[Array, "m 3 3"]) -> Float[np.ndarray, "m 3"]:
+    """ZXZ angles (a, b, c) [rad] along a history of rotations, counted on where they would jump.
+
+    `(a, b, c)` and `(a + pi, -b, c - pi)` are the same rotation, so b may be negative. While it is smaller than
+    `LEVEL`, c is carried over from the neighbours, a is the rest of a + c, and b the tilt in that direction; the three
+    are then the rotation within `LEVEL`. A jump is left at b = pi.
     """
+    a, b, total = _direction_tilt_sum(rotations)
+    defined = np.flatnonzero(b >= LEVEL)
+    if not defined.size:
+        return np.stack([total, b, np.zeros_like(b)], axis=1)
+    direction = np.unwrap(np.concatenate([[0.0], a[defined]]), period=np.pi)[1:]
+    c = np.interp(np.arange(len(a)), defined, total[defined] - direction)
+    return np.stack([total - c, b * np.cos(a - total + c), c], axis=1)
+
+
+def zxz_beside(rotations: Float[Array, "m 3 3"], reference: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, "m 3"]:
+    """ZXZ angles [rad] of rotations, of all that are possible those nearest to `reference`.
+
+    Where the tilt of either is below `LEVEL`, c is that of the reference and b the tilt in the direction a. NaN where
+    a rotation has NaN.
+    """
+    seen = np.asarray(np.isfinite(rotations).all(axis=(1, 2)))
+    result = np.full((len(reference), 3), np.nan)
+    a, b, total = _direction_tilt_sum(np.asarray(rotations, float)[seen])
+    near = reference[seen]
+    ways = []
+    for turn, tilt in ((a, b), (a + np.pi, -b)):
+        first = _nearest(turn, near[:, 0])
+        ways.append(np.stack([first, tilt, _nearest(total - first, near[:, 2])], axis=1))
+    far = [((way - near) ** 2).sum(axis=1) for way in ways]
+    result[seen] = np.where((far[0] <= far[1])[:, None], *ways)
+    small = seen.copy()
+    small[seen] = np.minimum(b, abs(near[:, 1])) < LEVEL
+    level = small[seen]
+    rest = _nearest(total[level] - reference[small, 2], reference[small, 0])
+    tilt = b[level] * np.cos(a[level] - rest)
+    result[small] = np.stack([rest, tilt, reference[small, 2]], axis=1)
+    return result
+
+
+def _direction_tilt_sum(rotations: Float[Array, "m 3 3"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """First ZXZ angle a, second one b >= 0, and a + c without jumps [rad]."""
     r = np.asarray(rotations, float)
-    sine = np.hypot(r[:, 0, 2], r[:, 1, 2])
-    a, b = np.arctan2(r[:, 0, 2], -r[:, 1, 2]), np.arctan2(sine, r[:, 2, 2])
-    c = np.arctan2(r[:, 2, 0], r[:, 2, 1])
-    total = np.arctan2(r[:, 1, 0] - r[:, 0, 1], r[:, 0, 0] + r[:, 1, 1])
-    level = sine < 1e-9
-    first = np.argmin(level) if not level.all() else 0
-    last = np.array([0.0, 0.0, total[first]]) if level[first] else np.array([0.0, b[first], c[first]])
-    if not level[first] and np.cos(a[first]) < 0:
-        last += [0.0, -2 * b[first], np.pi]
-    angles = np.empty((len(r), 3))
-    for k in range(len(r)):
-        here = np.array([[a[k], b[k], c[k]], [a[k] + np.pi, -b[k], c[k] + np.pi]])
-        if level[k] and r[k, 2, 2] > 0:
-            here = np.array([[last[0], 0.0, total[k] - last[0]]])
-        here[:, ::2] -= 2 * np.pi * np.round((here[:, ::2] - last[::2]) / (2 * np.pi))
-        last = angles[k] = here[np.argmin(np.abs(here - last).sum(1))]
-    return angles
+    b = np.arctan2(np.hypot(r[:, 0, 2], r[:, 1, 2]), r[:, 2, 2])
+    return np.arctan2(r[:, 0, 2], -r[:, 1, 2]), b, tilt_and_roll(r)[:, 2]
+
+
+def _nearest(angle: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """The angle, whole turns added so that it lies within half a turn of the reference."""
+    return angle - 2 * np.pi * np.round((angle - reference) / (2 * np.pi))

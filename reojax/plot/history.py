@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reojax._arrays import Array
-from reojax._orientation import continued_zxz, tilt_and_roll
+from reojax._orientation import LEVEL, tilt_and_roll, zxz_without_jumps
 from reojax.holonomy import rotation_history
 from reojax.path import Path
 from reojax.plot._style import INK, JOINTS, dress
@@ -23,8 +23,6 @@ _DASHES = ((None, None), (None, None), (5, 2.5), (1.5, 1.5))
 
 
 _EULER = (("first, about z", "#009e73"), ("second, about x", "#cc79a7"), ("third, about z", "#56b4e9"))
-_LEVEL = np.deg2rad(5)
-"""Second ZXZ angle below which the first and the third are shown as meaning little on their own [rad]."""
 
 
 def draw_orientation(
@@ -37,8 +35,8 @@ def draw_orientation(
         rotations: (m, 3, 3) equally spaced along the path, first to last.
         edges: number of edges of the path.
         angles: "tilt" for tilt about x, tilt about y and roll about z, `R = exp((tilt_x, tilt_y, 0)) Rz(roll)`;
-            "zxz" for the ZXZ angles (a, b, c) of `R = Rz(a) Rx(b) Rz(c)`, continued without jumps, and the sum a + c.
-            Where b is within 5 degrees of zero the axes are shaded: there only b and a + c can be compared.
+            "zxz" for the ZXZ angles (a, b, c) of `R = Rz(a) Rx(b) Rz(c)`, counted on without jumps, and a + c.
+            Where b is below 0.1 rad the axes are shaded: only b and a + c mean anything there, and c is carried over.
 
     Raises:
         ValueError: if the shape of `rotations` is another, or `angles` is neither.
@@ -49,13 +47,13 @@ def draw_orientation(
     if angles not in ("tilt", "zxz"):
         raise ValueError(f"`angles` is {angles!r}; it must be 'tilt' or 'zxz'.")
     along = np.linspace(0, edges, len(history))
-    told = tilt_and_roll(history) if angles == "tilt" else continued_zxz(history)
+    told = tilt_and_roll(history) if angles == "tilt" else zxz_without_jumps(history)
     for (label, colour), values in zip(_ANGLES if angles == "tilt" else _EULER, told.T, strict=True):
         axes.plot(along, np.rad2deg(values), color=colour, label=label, linewidth=2)
     if angles == "zxz":
         total = np.rad2deg(told[:, 0] + told[:, 2])
         axes.plot(along, total, color="#d55e00", label="first + third", linewidth=2, dashes=(5, 2))
-        near = np.abs(told[:, 1]) < _LEVEL
+        near = np.abs(told[:, 1]) < LEVEL
         axes.fill_between(along, 0, 1, where=near, transform=axes.get_xaxis_transform(), color="#eeeeee", zorder=0)
     axes.set_ylabel("base orientation [deg]", color=INK)
     dress(axes, edges)

@@ -66,6 +66,16 @@ def cut(count: int, chunk_size: int | None, bytes_per_design: int, platform: str
     return Cut(count, chunk, block, -(-chunk // block))
 
 
+class Chunk(NamedTuple):
+    """Results of a chunk."""
+
+    number: int
+    results: list[np.ndarray]
+    """The function's arrays in the order of the pytree's leaves, the chunk's designs in front."""
+    bad: dict[int, str]
+    """Reasons by number of the design, of designs without a finite result."""
+
+
 class Program(NamedTuple):
     """The compiled program of a sweep on a mesh of devices: one chunk for each of them."""
 

@@ -3,27 +3,17 @@
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import numpy as np
 from jax.sharding import Mesh
 
-from reojax.sweep.chunks import Program, compiled
+from reojax.sweep.chunks import Chunk, Program, compiled
 from reojax.sweep.outputs import Outputs, bad_rows, blank
 
 IN_FLIGHT = 2
 """Calls under way while the results of an earlier one are put away."""
-
-
-class Chunk(NamedTuple):
-    """Results of a chunk."""
-
-    number: int
-    results: list[np.ndarray]
-    """The function's arrays in the order of the pytree's leaves, the chunk's designs in front."""
-    bad: dict[int, str]
-    """Reasons by number of the design, of designs without a finite result."""
 
 
 def run(function: Callable[..., Any], program: Program, outputs: Outputs, todo: Iterable[int]) -> Iterator[Chunk]:

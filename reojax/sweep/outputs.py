@@ -1,6 +1,6 @@
 """What a sweep's function returns: names, shapes and types of its arrays, and which results are bad."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -30,11 +30,6 @@ class Outputs(NamedTuple):
         """Names of the arrays."""
         return tuple(array.name for array in self.arrays)
 
-    @property
-    def bytes_per_design(self) -> int:
-        """Memory that the results of a design take."""
-        return sum(int(np.prod(array.shape, dtype=np.int64)) * array.dtype.itemsize for array in self.arrays)
-
 
 def scalars(designs: Designs) -> dict[str, jax.ShapeDtypeStruct]:
     """Shapes and types of one design."""
@@ -57,10 +52,18 @@ def outputs_of(function: Callable[..., Any], designs: Designs) -> Outputs:
     names = [jax.tree_util.keystr(path, simple=True, separator=".") or "result" for path, _ in leaves]
     if not leaves:
         raise ValueError("`function` returns no array; there is nothing to keep of a design.")
+    for name, (_, leaf) in zip(names, leaves, strict=True):
+        if leaf.dtype.kind not in "biufc":
+            raise ValueError(f"result `{name}` has entries of type {leaf.dtype}; only NumPy's number types will do.")
     if len(set(names)) < len(names):
         raise ValueError(f"`function` returns several arrays of the same name, among {', '.join(names)}.")
     arrays = (Output(name, leaf.shape, np.dtype(leaf.dtype)) for name, (_, leaf) in zip(names, leaves, strict=True))
     return Outputs(tuple(arrays), structure)
+
+
+def bytes_per_design(outputs: Sequence[Output]) -> int:
+    """Memory that the results of a design take."""
+    return sum(int(np.prod(output.shape, dtype=np.int64)) * output.dtype.itemsize for output in outputs)
 
 
 def bad_rows(outputs: Outputs, results: list[np.ndarray]) -> dict[int, str]:

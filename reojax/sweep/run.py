@@ -1,22 +1,33 @@
 """`sweep`: a function over a grid of designs, chunk by chunk."""
 
 import logging
-from collections.abc import Callable, Mapping
+import os
+import random
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from math import prod
 from typing import Any
 
 import jax
 import numpy as np
+from jax.sharding import Mesh
 from numpy.typing import ArrayLike
 from tqdm import tqdm
 
 from reojax.sweep.chunks import Cut, compiled, cut
 from reojax.sweep.devices import Devices, mesh_of
-from reojax.sweep.engine import Chunk, run
+from reojax.sweep.engine import run
 from reojax.sweep.grid import Designs, check_axes, check_function
-from reojax.sweep.outputs import Outputs, outputs_of
+from reojax.sweep.identity import identity
+from reojax.sweep.memory import Memory
+from reojax.sweep.merge import assembled
+from reojax.sweep.outputs import Outputs, bytes_per_design, outputs_of
+from reojax.sweep.store import Store, create
 from reojax.sweep.table import Sweep
 
 log = logging.getLogger("reojax")
+
+_TOLD = 5
+"""Bad designs that are told one by one."""
 
 
 def sweep(
@@ -24,58 +35,180 @@ def sweep(
     axes: Mapping[str, ArrayLike],
     *,
     chunk_size: int | None = None,
+    store: str | os.PathLike[str] | None = None,
     devices: Devices = None,
     progress: bool = True,
     units: Mapping[str, str] | None = None,
+    shard: tuple[int, int] | None = None,
 ) -> Sweep:
     """Compute `function` for every design of a grid or a list.
+
+    Designs are run in chunks by one compiled program, so memory stays flat, and the results do not depend, to
+    the last bit, on how the chunks are spread over devices, shards and processes.
+
+    With a `store`, finished chunks are kept in that folder, and a sweep that was stopped goes on where it was.
+    Several processes may run the same sweep on one store at once: each takes the missing chunks in an order of
+    its own, and passes over those that another one has finished.
+
+    In a program of several processes (`jax.distributed.initialize` has been called in each, with the same
+    sweep), all devices of all of them take part. They need a `store` in a folder that all of them see.
 
     Args:
         function: takes the named scalars and returns a pytree of arrays; pure, traced by JAX.
         axes: 1-D arrays by name, for the full grid in this order; or `zipped(...)`, for a list of designs.
-        chunk_size: designs of a call per device; default by the size of the sweep.
+        chunk_size: designs in a chunk; default by the size of the sweep.
+        store: folder for finished chunks, made if missing.
         devices: None for the default device, a number of this host's devices, or a list of devices.
         progress: whether to show progress on stderr.
         units: units of axes and results by name, for labels.
+        shard: (i, n) to run only every n-th chunk, from the i-th on, `0 <= i < n`; needs a `store`.
+
+    Returns:
+        the sweep. With a `store`, its results are read from there when they are asked for.
 
     Raises:
-        ValueError: naming what is wrong with the arguments. A design that fails raises nothing: see `Sweep.bad`.
+        ValueError: naming what is wrong with the arguments, or how the store's sweep differs. A design that
+            fails raises nothing: it is logged, its results are NaN, and `Sweep.bad` has it.
     """
+    found = computed(function, axes, chunk_size, store, devices, progress, units, shard)
+    if bad := found.bad:
+        lines = [f"{len(bad)} of {prod(found.shape)} designs gave no finite result:"]
+        lines += [f"  {design}" for design in bad[:_TOLD]]
+        log.warning("\n".join(lines + ["  ..."] * (len(bad) > _TOLD)))
+    return found
+
+
+def computed(
+    function: Callable[..., Any],
+    axes: Mapping[str, ArrayLike],
+    chunk_size: int | None,
+    store: str | os.PathLike[str] | None,
+    devices: Devices,
+    progress: bool,
+    units: Mapping[str, str] | None,
+    shard: tuple[int, int] | None,
+) -> Sweep:
+    """Do what `sweep` does, and leave the telling of bad designs to the caller."""
     designs = check_axes(axes)
     check_function(function, designs)
     mesh = mesh_of(devices)
+    first, parts = _checked_shard(shard, store)
+    if store is None and jax.process_count() > 1:
+        raise ValueError("several processes put their results into a `store`; give the folder.")
     outputs = outputs_of(function, designs)
     labels = _checked_units(units, designs, outputs)
-    sizes = cut(designs.total, chunk_size, outputs.bytes_per_design, mesh.devices.flat[0].platform)
-    memory = _Memory(outputs, sizes)
-    program = compiled(function, designs, sizes, mesh)
-    with tqdm(total=designs.total, unit=" designs", unit_scale=True, disable=not progress) as bar:
-        for chunk in run(function, program, outputs, range(sizes.chunks)):
-            memory.put(chunk)
-            start, stop = sizes.bounds(chunk.number)
-            bar.update(stop - start)
-    result = Sweep(designs, labels, lambda: memory.results(designs), memory.failures)
-    _report(result)
-    return result
+    platform = mesh.devices.flat[0].platform
+    sizes = cut(designs.total, chunk_size, bytes_per_design(outputs.arrays), platform)
+    mine = range(first, sizes.chunks, parts)
+    if store is None:
+        memory = Memory(outputs.arrays, sizes, "give a `store`")
+        program = compiled(function, designs, sizes, mesh)
+        with _Progress(sizes, mine, progress) as shown:
+            for chunk in run(function, program, outputs, mine):
+                memory.put(chunk)
+                shown.add(chunk.number)
+        failures, load = memory.failures, lambda: memory.arrays(designs)
+    else:
+        kept = create(store, identity(function, designs, outputs, sizes, platform), designs, labels)
+        failures = _into_store(function, outputs, kept, mesh, mine, progress)
+        load = lambda: assembled([kept])[0]
+    return Sweep(designs, labels, lambda: jax.tree.unflatten(outputs.structure, load()), failures)
 
 
-class _Memory:
-    """Results of a sweep in memory."""
+def _into_store(
+    function: Callable[..., Any], outputs: Outputs, store: Store, mesh: Mesh, mine: range, progress: bool
+) -> dict[int, str]:
+    """Compute the chunks `mine` that the store does not have; return the bad designs of all of `mine`."""
+    failures = {}
+    missing = []
+    for number in mine:
+        chunk = store.get(number)
+        if chunk is None:
+            store.file(number).unlink(missing_ok=True)
+            missing.append(number)
+        else:
+            failures[number] = chunk.bad
+    several = jax.process_count() > 1
+    if several:
+        missing = _agreed(missing, mine)
+    else:
+        random.Random(os.urandom(8)).shuffle(missing)
+    with _Progress(store.sizes, mine, progress and jax.process_index() == 0) as shown:
+        shown.begin(number for number in mine if number in failures)
 
-    def __init__(self, outputs: Outputs, sizes: Cut) -> None:
-        self.outputs, self.sizes = outputs, sizes
-        self.arrays = [np.empty((sizes.total, *output.shape), output.dtype) for output in outputs.arrays]
-        self.failures: dict[int, str] = {}
+        def todo() -> Iterator[int]:
+            for number in missing:
+                if several or not store.file(number).exists():
+                    yield number
+                else:  # another process has finished it
+                    shown.add(number)
 
-    def put(self, chunk: Chunk) -> None:
-        start, stop = self.sizes.bounds(chunk.number)
-        for array, values in zip(self.arrays, chunk.results, strict=True):
-            array[start:stop] = values
-        self.failures |= chunk.bad
+        try:
+            if missing:
+                for chunk in run(function, compiled(function, store.designs, store.sizes, mesh), outputs, todo()):
+                    store.put(chunk)
+                    failures[chunk.number] = chunk.bad
+                    shown.add(chunk.number)
+        except KeyboardInterrupt:
+            log.warning(
+                f"stopped; finished chunks are in {str(store.folder)!r}, and the same sweep goes on from there."
+            )
+            raise
+    if several:
+        from jax.experimental import multihost_utils
 
-    def results(self, designs: Designs) -> Any:
-        shaped = [array.reshape(designs.shape + array.shape[1:]) for array in self.arrays]
-        return jax.tree.unflatten(self.outputs.structure, shaped)
+        multihost_utils.sync_global_devices("reojax.sweep: all chunks are stored")
+    for number in mine:
+        if number not in failures and (chunk := store.get(number)) is not None:
+            failures[number] = chunk.bad
+    return {design: reason for bad in failures.values() for design, reason in bad.items()}
+
+
+def _agreed(missing: Sequence[int], mine: range) -> list[int]:
+    """Chunks that are missing as the first process sees it, the same list in every process."""
+    from jax.experimental import multihost_utils
+
+    mask = multihost_utils.broadcast_one_to_all(np.isin(mine, missing))
+    return [number for number, absent in zip(mine, mask, strict=True) if absent]
+
+
+class _Progress:
+    """Progress on stderr, in designs."""
+
+    def __init__(self, sizes: Cut, mine: range, show: bool) -> None:
+        self._sizes = sizes
+        total = sum(map(self._designs, mine))
+        self._bar = tqdm(total=total, unit=" designs", unit_scale=True, disable=not show, mininterval=0.5)
+
+    def _designs(self, chunk: int) -> int:
+        start, stop = self._sizes.bounds(chunk)
+        return stop - start
+
+    def begin(self, chunks: Iterable[int]) -> None:
+        """Count chunks that were there before."""
+        self._bar.initial = sum(map(self._designs, chunks))
+        self._bar.n = self._bar.initial
+        self._bar.refresh()
+
+    def add(self, chunk: int) -> None:
+        self._bar.update(self._designs(chunk))
+
+    def __enter__(self) -> "_Progress":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()
+
+
+def _checked_shard(shard: tuple[int, int] | None, store: object) -> tuple[int, int]:
+    if shard is None:
+        return 0, 1
+    first, parts = shard
+    if not 0 <= first < parts:
+        raise ValueError(f"`shard` is {shard!r}; it must be (i, n) with 0 <= i < n.")
+    if store is None:
+        raise ValueError("a shard's results go into a `store`; give the folder.")
+    return first, parts
 
 
 def _checked_units(units: Mapping[str, str] | None, designs: Designs, outputs: Outputs) -> dict[str, str]:
@@ -86,13 +219,3 @@ def _checked_units(units: Mapping[str, str] | None, designs: Designs, outputs: O
             names = ", ".join(known)
             raise ValueError(f"units[{name!r}] is {unit!r}; it must be the text of a unit, of one of {names}.")
     return labels
-
-
-def _report(result: Sweep) -> None:
-    """Say which designs are bad."""
-    if not result.bad:
-        return
-    lines = [f"{len(result.bad)} of {np.prod(result.shape)} designs gave no finite result:"]
-    for bad in result.bad[:5]:
-        lines.append("  " + ", ".join(f"{name}={value:g}" for name, value in bad.design.items()) + f": {bad.reason}")
-    log.warning("\n".join(lines + ["  ..."] * (len(result.bad) > 5)))

@@ -26,6 +26,9 @@ class BadDesign(NamedTuple):
     reason: str
     """What was wrong: a result that is not finite, or an exception."""
 
+    def __str__(self) -> str:
+        return ", ".join(f"{name}={value:g}" for name, value in self.design.items()) + f": {self.reason}"
+
 
 class Sweep:
     """Results of a sweep over a grid or list of designs, with the axes and their units.
@@ -75,6 +78,10 @@ class Sweep:
             )
             for number in sorted(self._failures)
         ]
+
+    def design(self, number: int) -> dict[str, float]:
+        """Values of one design, by its number through the flattened grid."""
+        return self._designs.design(number)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the results as a flat dict: `turn.angle` is the field `angle` of the entry `turn`."""
