@@ -29,6 +29,7 @@ from reojax.momentum import (
 from reojax.motion import Motion as Motion, simulate as simulate
 from reojax.motor import RE_MAX_17 as RE_MAX_17, Motor as Motor, with_motors as with_motors
 from reojax.path import Path as Path, joint_travel as joint_travel, polygon as polygon
+from reojax.plan import Plan as Plan, plan as plan, plan_many as plan_many, replan as replan
 from reojax.robot import Robot as Robot, make_robot as make_robot
 from reojax.sweep import Sweep as Sweep, sweep as sweep, zipped as zipped
 from reojax.time_law import (
