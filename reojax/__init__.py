@@ -5,6 +5,7 @@ from reojax.calibrate import Calibration as Calibration, calibrate as calibrate
 from reojax.capture import Capture as Capture, make_capture as make_capture, read_capture as read_capture
 from reojax.certificate import Certificate as Certificate, certify as certify
 from reojax.comparison import Comparison as Comparison, compare as compare, joints_simulated as joints_simulated
+from reojax.curvature import curvature as curvature
 from reojax.dynamics import (
     base_velocity as base_velocity,
     forward_dynamics as forward_dynamics,
