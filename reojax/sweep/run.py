@@ -203,12 +203,12 @@ class _Progress:
 def _checked_shard(shard: tuple[int, int] | None, store: object) -> tuple[int, int]:
     if shard is None:
         return 0, 1
-    first, parts = shard
-    if not 0 <= first < parts:
+    pair = shard if isinstance(shard, Sequence) and len(shard) == 2 else (0, 0)
+    if not all(isinstance(number, int | np.integer) for number in pair) or not 0 <= pair[0] < pair[1]:
         raise ValueError(f"`shard` is {shard!r}; it must be (i, n) with 0 <= i < n.")
     if store is None:
         raise ValueError("a shard's results go into a `store`; give the folder.")
-    return first, parts
+    return pair
 
 
 def _checked_units(units: Mapping[str, str] | None, designs: Designs, outputs: Outputs) -> dict[str, str]:
