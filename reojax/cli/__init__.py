@@ -10,10 +10,10 @@ import os
 import sys
 from collections.abc import Sequence
 
-from reojax.cli import compare, simulate
+from reojax.cli import compare, export, simulate
 from reojax.cli._arguments import BadInput, Parser, joined, version
 
-COMMANDS = {"simulate": simulate, "compare": compare}
+COMMANDS = {"simulate": simulate, "compare": compare, "export": export}
 """Subcommands by name."""
 
 
