@@ -14,17 +14,21 @@ from reojax.design.problem import Measure, Outcome
 from reojax.path import joint_travel
 
 
-def turned_to(target: ArrayLike) -> Measure:
+def turned_to(target: ArrayLike | str) -> Measure:
     """Rotation vector (3,) from the target to the net rotation [rad], for an equality: all three components.
 
     Smooth near the target, half turns included: it is taken relative to the target.
 
     Args:
-        target: (3, 3) rotation.
+        target: (3, 3) rotation; or the name of a variable (3,) that is its rotation vector, to be held: then one
+            compiled problem serves all targets.
 
     Raises:
         ValueError: if it is not a rotation.
     """
+    if isinstance(target, str):
+        name = target
+        return lambda outcome: so3.log(so3.exp(outcome.values[name]).T @ outcome.rotation)
     matrix = numbers("target", target, (3, 3))
     if np.abs(matrix.T @ matrix - np.eye(3)).max() > 1e-6 or np.linalg.det(matrix) < 0:
         raise ValueError(f"`target` is {matrix.tolist()}; it must be a rotation matrix.")

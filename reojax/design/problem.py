@@ -102,7 +102,12 @@ class Problem:
         return np.clip(x, self.space.lower, self.space.upper)
 
     def solve(
-        self, starts: int | ArrayLike = 64, *, seed: int = 0, hold: Mapping[str, float] | None = None, **options: Any
+        self,
+        starts: int | ArrayLike = 64,
+        *,
+        seed: int = 0,
+        hold: Mapping[str, ArrayLike] | None = None,
+        **options: Any,
     ) -> Solution:
         """Solve from many starts by `optimise`.
 
@@ -132,12 +137,12 @@ class Problem:
         ]
         return min(answers, key=lambda a: (not a.converged[a.best], a.cost[a.best]))
 
-    def _solve_held(self, x: np.ndarray, held: Mapping[str, float], options: Mapping[str, Any]) -> Solution:
+    def _solve_held(self, x: np.ndarray, held: Mapping[str, ArrayLike], options: Mapping[str, Any]) -> Solution:
         lower, upper, x = self.space.lower.copy(), self.space.upper.copy(), x.copy()
         for name, value in held.items():
             place = self.space.place(name)
-            if not ((lower[place] <= value) & (value <= upper[place])).all():
-                raise ValueError(f"{name!r} is held at {value:g}, which is outside of its bounds (SI).")
+            if not (np.all(lower[place] <= value) and np.all(value <= upper[place])):
+                raise ValueError(f"{name!r} is held at {value}, which is outside of its bounds (SI).")
             lower[place] = upper[place] = value
             if x.ndim == 2:
                 x[:, place] = value
