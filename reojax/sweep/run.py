@@ -70,6 +70,25 @@ def sweep(
         ValueError: naming what is wrong with the arguments, or how the store's sweep differs. A design that
             fails raises nothing: it is logged, its results are NaN, and `Sweep.bad` has it.
     """
+    found = computed(function, axes, chunk_size, store, devices, progress, units, shard)
+    if bad := found.bad:
+        lines = [f"{len(bad)} of {prod(found.shape)} designs gave no finite result:"]
+        lines += [f"  {design}" for design in bad[:_TOLD]]
+        log.warning("\n".join(lines + ["  ..."] * (len(bad) > _TOLD)))
+    return found
+
+
+def computed(
+    function: Callable[..., Any],
+    axes: Mapping[str, ArrayLike],
+    chunk_size: int | None,
+    store: str | os.PathLike[str] | None,
+    devices: Devices,
+    progress: bool,
+    units: Mapping[str, str] | None,
+    shard: tuple[int, int] | None,
+) -> Sweep:
+    """Do what `sweep` does, and leave the telling of bad designs to the caller."""
     designs = check_axes(axes)
     check_function(function, designs)
     mesh = mesh_of(devices)
@@ -93,9 +112,7 @@ def sweep(
         kept = create(store, identity(function, designs, outputs, sizes, platform), designs, labels)
         failures = _into_store(function, outputs, kept, mesh, mine, progress)
         load = lambda: assembled([kept])[0]
-    result = Sweep(designs, labels, lambda: jax.tree.unflatten(outputs.structure, load()), failures)
-    _report(result)
-    return result
+    return Sweep(designs, labels, lambda: jax.tree.unflatten(outputs.structure, load()), failures)
 
 
 def _into_store(
@@ -202,12 +219,3 @@ def _checked_units(units: Mapping[str, str] | None, designs: Designs, outputs: O
             names = ", ".join(known)
             raise ValueError(f"units[{name!r}] is {unit!r}; it must be the text of a unit, of one of {names}.")
     return labels
-
-
-def _report(result: Sweep) -> None:
-    """Say which designs are bad."""
-    if not (bad := result.bad):
-        return
-    lines = [f"{len(bad)} of {prod(result.shape)} designs gave no finite result:"]
-    lines += [f"  {design}" for design in bad[:_TOLD]]
-    log.warning("\n".join(lines + ["  ..."] * (len(bad) > _TOLD)))
