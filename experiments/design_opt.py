@@ -164,8 +164,10 @@ def _best_of(found: Solution, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _picture(loops: list[dict[str, Any]], curves: dict[str, dict[str, Any]], target: float) -> Figure:
     figure = Figure(figsize=(11, 7.2), layout="constrained", facecolor="white")
-    above, below = figure.subfigures(2, 1)
-    for axes, loop in zip(np.atleast_1d(above.subplots(1, len(loops), sharey=True)), loops, strict=True):
+    grid, wide = figure.add_gridspec(2, 6), 6 // len(loops)
+    for i, loop in enumerate(loops):
+        axes = figure.add_subplot(grid[0, wide * i : wide * (i + 1)])
+        axes.set_ylim(-300, 300)
         corners = np.array(loop["waypoints_deg"])
         along = np.concatenate([[0], np.cumsum(np.abs(np.diff(corners, axis=0)).sum(1))])
         for name, angle, colour, line in zip(
@@ -175,9 +177,10 @@ def _picture(loops: list[dict[str, Any]], curves: dict[str, dict[str, Any]], tar
         axes.set(xlabel="joint travel [deg]", title=f"{loop['loop']}: {loop['travel_deg']:.0f}°")
         axes.grid(axis="y", color="#dddddd")
         axes.spines[["top", "right"]].set_visible(False)
-    above.axes[0].set_ylabel("joint angle [deg]")
-    above.axes[0].legend(frameon=False, ncols=3, loc="lower left", fontsize=8)
-    for axes, (name, curve), mark in zip(below.subplots(1, 2, sharey=True), curves.items(), THESIS, strict=True):
+    figure.axes[0].set_ylabel("joint angle [deg]")
+    figure.axes[0].legend(frameon=False, ncols=3, loc="lower left", fontsize=8)
+    for i, ((name, curve), mark) in enumerate(zip(curves.items(), THESIS, strict=True)):
+        axes = figure.add_subplot(grid[1, 3 * i : 3 * (i + 1)])
         x, travel = np.array(curve["values"]), np.array(curve["travel_deg"])
         travel = np.where(curve["converged"], travel, np.nan)
         reflected = name == "gear ratio"
@@ -188,14 +191,17 @@ def _picture(loops: list[dict[str, Any]], curves: dict[str, dict[str, Any]], tar
         axes.plot(mark, travel[at, 0], "*", color="black", markersize=15, label="the thesis's choice", zorder=5)
         axes.set(xlabel=name.replace("^2", "²"), title=f"Manoeuvre A to {target:g}° of roll")
         if reflected:
-            top = axes.secondary_xaxis("top", functions=(lambda n: ROTOR * n**2, lambda i: np.sqrt(i / ROTOR)))
+            top = axes.secondary_xaxis(
+                "top", functions=(lambda n: ROTOR * n**2, lambda i: np.sqrt(np.maximum(i, 0) / ROTOR))
+            )
             top.set_xticks([0.1, 10, 50, 100, 150, 200])
             top.set_xlabel("reflected rotor inertia, ratio² × 0.1 kg mm² [kg mm²]")
             axes.set_title("")
         axes.grid(color="#dddddd")
         axes.legend(frameon=False)
         axes.spines[["right"]].set_visible(False)
-    below.axes[0].set_ylabel("least joint travel [deg]")
+        axes.set_xlim(0, None)
+        axes.set_ylabel("least joint travel [deg]")
     return figure
 
 

@@ -91,7 +91,7 @@ def theirs(problem: Problem, starts: np.ndarray) -> dict[str, Any]:
     price = np.asarray(jax.grad(lambda x: problem.cost(whole(x)))(first))
     rows = np.asarray(jax.jacfwd(lambda x: problem.inequality(whole(x)))(first))
     offset = np.asarray(problem.inequality(whole(first))) - rows @ first
-    equality(first), slope(first)
+    jax.block_until_ready((equality(first), slope(first)))
     constraints = [
         {"type": "eq", "fun": lambda x: np.asarray(equality(x)), "jac": lambda x: np.asarray(slope(x))},
         {"type": "ineq", "fun": lambda x: -(rows @ x + offset), "jac": lambda x: -rows},
