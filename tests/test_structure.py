@@ -34,7 +34,7 @@ LAYERS = [
     ["design._quadratic"],
     ["design._steps"],
     ["design.solver"],
-    ["design.variables", "design.edits", "design.tolerances"],
+    ["design.descent", "design.variables", "design.edits", "design.tolerances"],
     ["design.loops"],
     ["design.smooth", "design.problem"],
     ["design.measures"],

@@ -7,6 +7,7 @@ from reojax.design.certainty import (
     sensitivities as sensitivities,
     spread as spread,
 )
+from reojax.design.descent import descend as descend
 from reojax.design.edits import (
     with_com_offset as with_com_offset,
     with_joint_inertia as with_joint_inertia,
