@@ -6,6 +6,7 @@ from reojax.capture import Capture as Capture, make_capture as make_capture, rea
 from reojax.certificate import Certificate as Certificate, certify as certify
 from reojax.comparison import Comparison as Comparison, compare as compare, joints_simulated as joints_simulated
 from reojax.control import Gains as Gains, Tracking as Tracking, track as track
+from reojax.curvature import curvature as curvature
 from reojax.dynamics import (
     base_velocity as base_velocity,
     forward_dynamics as forward_dynamics,
@@ -30,6 +31,7 @@ from reojax.momentum import (
 from reojax.motion import Motion as Motion, simulate as simulate
 from reojax.motor import RE_MAX_17 as RE_MAX_17, Motor as Motor, with_motors as with_motors
 from reojax.path import Path as Path, joint_travel as joint_travel, polygon as polygon
+from reojax.plan import Plan as Plan, plan as plan, plan_many as plan_many, replan as replan
 from reojax.release import (
     Release as Release,
     Released as Released,

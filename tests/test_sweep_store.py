@@ -17,6 +17,7 @@ import sweep_child
 
 import reojax
 from reojax.sweep import merge
+from reojax.sweep.store import Store
 
 CHILD = Path(sweep_child.__file__)
 AXES = {"x": np.arange(6.0), "y": np.array([1.0, 2.0])}
@@ -187,7 +188,7 @@ def test_two_processes_share_a_store(tmp_path):
 
 
 def test_ctrl_c_keeps_what_is_stored(tmp_path, monkeypatch, caplog):
-    put, done = reojax.sweep.__globals__["Store"].put, []
+    put, done = Store.put, []
 
     def put_two(self, chunk):
         if len(done) == 2:
@@ -195,7 +196,7 @@ def test_ctrl_c_keeps_what_is_stored(tmp_path, monkeypatch, caplog):
         done.append(chunk.number)
         put(self, chunk)
 
-    monkeypatch.setattr(reojax.sweep.__globals__["Store"], "put", put_two)
+    monkeypatch.setattr(Store, "put", put_two)
     with pytest.raises(KeyboardInterrupt):
         small(tmp_path / "s")
     assert "the same sweep goes on from there" in caplog.text

@@ -17,5 +17,16 @@ from reojax.plot.frames import (
     frames_along as frames_along,
     frames_figure as frames_figure,
 )
-from reojax.plot.history import history_figure as history_figure
+from reojax.plot.history import (
+    draw_joints as draw_joints,
+    draw_orientation as draw_orientation,
+    history_figure as history_figure,
+)
+from reojax.plot.maps import (
+    draw_lines as draw_lines,
+    draw_loop as draw_loop,
+    draw_map as draw_map,
+    draw_poses as draw_poses,
+)
 from reojax.plot.robots import draw_axes as draw_axes, draw_robot as draw_robot, draw_robot_flat as draw_robot_flat
+from reojax.plot.sweeps import sweep_figure as sweep_figure

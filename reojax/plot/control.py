@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 from numpy.typing import ArrayLike
 
 from reojax._arrays import Array
@@ -94,6 +95,8 @@ def bandwidth_figure(bandwidth: ArrayLike, lag: dict[str, np.ndarray], chosen: d
         axes.axvline(chosen[name], color=colour, linewidth=1, linestyle=":")
     axes.set_xscale("log")
     _dress(axes, columns=2)
+    axes.set_xticks([25, 50, 100, 200, 400])
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.margins(x=0.05)
     axes.set_xlabel("bandwidth of the controller [rad/s] (dotted: tuned)", color=INK)
     axes.set_ylabel("RMS error of the joints [deg]", color=INK)
