@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
+from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from numpy.typing import ArrayLike
@@ -174,7 +175,11 @@ def _show(axes: Axes3D, points: np.ndarray) -> None:
     middle, half = (low + high) / 2, max(high - low) / 2
     for limit, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle, strict=True):
         limit(centre - half, centre + half)
-    axes.set_box_aspect((1, 1, 1), zoom=1.3)  # pyright: ignore[reportArgumentType]  (zoom is a float)
+    for axis, name in zip((axes.xaxis, axes.yaxis, axes.zaxis), "xyz", strict=True):
+        axis.set_label_text(f"{name} [m]", color=INK)
+        axis.set_major_locator(MaxNLocator(4))
+    axes.tick_params(labelsize=8)
+    axes.set_box_aspect((1, 1, 1), zoom=1.1)  # pyright: ignore[reportArgumentType]  (zoom is a float)
 
 
 def _vector(entry: str, value: Any, length: int) -> np.ndarray:
