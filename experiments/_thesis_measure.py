@@ -11,7 +11,7 @@ import reojax
 from reojax import robots
 from reojax._orientation import zxz_without_jumps
 from reojax.motion import simulate
-from reojax.motor import RE_MAX_17
+from reojax.motor import RE_MAX_17, no_load_speed
 from reojax.robots.prototype import END_INERTIA, GEAR_RATIO, ROTOR_INERTIA
 
 SEED = 2019
@@ -123,13 +123,18 @@ def six_body() -> Numbers:
 
 
 def motors(robot: reojax.Robot) -> Numbers:
-    """Figure 3.2: least distance to the torque-speed line in stall torques, at a bend by 120 degrees."""
+    """Figure 3.2: distance to the torque-speed line in stall torques, at a bend by 120 degrees."""
     path = reojax.polygon(FULL_A.waypoints[:2])
     times = (110, 100, 90, 80)  # ms
     runs = [simulate(robot, path, "quintic", durations=t / 1000, motors=RE_MAX_17, samples=64) for t in times]
-    return {
+    free = no_load_speed(RE_MAX_17) / RE_MAX_17.gear_ratio
+    fastest = [float(np.abs(np.asarray(run.theta_dot)).max() / free) for run in runs]
+    bent = np.asarray(reojax.joint_inertia(robot, path.waypoints[-1]))[1, 1]
+    numbers = {
         f"margin_at_{t}_ms": float(np.min(np.asarray(run.margin)[:, 1])) for t, run in zip(times, runs, strict=True)
     }
+    numbers |= {f"speed_at_{t}_ms": share for t, share in zip(times, fastest, strict=True)}
+    return {**numbers, "centre_inertia_kg_mm2": bent * 1e6}
 
 
 LAWS = {
