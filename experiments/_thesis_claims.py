@@ -268,8 +268,8 @@ def _experiment(n: dict[str, float]) -> list[Claim]:
             else "",
             known[80] < 0 <= known[90] < known[100] < known[110] if known else None,
             f"room in stall torques. Speed alone agrees: {n['speed_at_90_ms']:.0%} of no load at 90 ms, "
-            f"{n['speed_at_80_ms']:.0%} at 80. The load, {n['centre_inertia_kg_mm2']:.0f} kg mm² at the bent joint, comes "
-            "from chosen masses and sizes, as the thesis publishes none; winding and law are assumed, too"
+            f"{n['speed_at_80_ms']:.0%} at 80. The load, {n['centre_inertia_kg_mm2']:.0f} kg mm² at the bent joint, "
+            "comes from chosen masses and sizes, as the thesis publishes none; winding and law are assumed, too"
             if known
             else LEFT_OUT,
         ),

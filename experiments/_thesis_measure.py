@@ -264,6 +264,6 @@ def measure(grids: dict[str, Grid], rotations: np.ndarray, *, quick: bool) -> Nu
     """Measure what the claims are judged by, from sweeps and history of A; `quick` leaves out three parts."""
     robot = robots.prototype()
     parts = [amplitudes(grids), designs(grids), history(rotations), middle_links(robot), paths(robot), symmetric(robot)]
-    parts += [reach(grids, targets=20 if quick else 100)]
+    parts += [reach(grids, targets=10 if quick else 100)]
     parts += [] if quick else [six_body(), rectangles(), motors(robot)]
     return {key: float(value) for part in parts for key, value in part.items()}

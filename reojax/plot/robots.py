@@ -1,6 +1,7 @@
 """Robots in space: their links at a pose, about their centre of mass."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -138,13 +139,20 @@ def posed_faces(robot: Robot, theta: ArrayLike, rotation: ArrayLike | None = Non
     if base.shape != (3, 3) or not np.isfinite(base).all() or np.abs(base @ base.T - np.eye(3)).max() > 1e-3:
         raise ValueError(f"`rotation` is {base.tolist()}; it must be a rotation matrix, (3, 3).")
     faces, colours = [], []
-    for link, own in enumerate(link_faces(robot)):
+    links, pins = _parts(robot)
+    for link, own in enumerate(links):
         faces.append(own @ turned[link].T + origin[link])
         colours += [BASE if not link else LINKS[(link - 1) % len(LINKS)]] * len(own)
-    for joint, own in enumerate(joint_faces(robot)):
+    for joint, own in enumerate(pins):
         faces.append(own @ turned[joint + 1].T + origin[joint + 1])
         colours += [INK] * len(own)
     return np.concatenate(faces) @ base.T, colours
+
+
+@lru_cache(maxsize=32)
+def _parts(robot: Robot) -> tuple[list[Faces], list[Faces]]:
+    """Faces of links and joints; kept, as frames and animations draw one robot many times."""
+    return link_faces(robot), joint_faces(robot)
 
 
 def poses(robot: Robot, theta: np.ndarray) -> tuple[Float[np.ndarray, "n 3 3"], Float[np.ndarray, "n 3"]]:
