@@ -10,10 +10,10 @@ import os
 import sys
 from collections.abc import Sequence
 
-from reojax.cli import compare, merge, simulate, sweep
+from reojax.cli import compare, export, merge, simulate, sweep
 from reojax.cli._arguments import BadInput, Parser, joined, version
 
-COMMANDS = {"simulate": simulate, "compare": compare, "sweep": sweep, "merge": merge}
+COMMANDS = {"simulate": simulate, "compare": compare, "export": export, "sweep": sweep, "merge": merge}
 """Subcommands by name."""
 
 
