@@ -10,10 +10,17 @@ import os
 import sys
 from collections.abc import Sequence
 
-from reojax.cli import compare, merge, plan, simulate, sweep
+from reojax.cli import compare, export, merge, plan, simulate, sweep
 from reojax.cli._arguments import BadInput, Parser, joined, version
 
-COMMANDS = {"simulate": simulate, "compare": compare, "sweep": sweep, "merge": merge, "plan": plan}
+COMMANDS = {
+    "simulate": simulate,
+    "compare": compare,
+    "export": export,
+    "plan": plan,
+    "sweep": sweep,
+    "merge": merge,
+}
 """Subcommands by name."""
 
 

@@ -6,6 +6,7 @@ and `animation` write files. Robots are drawn from their numbers, see `reojax.pl
 
 from reojax.plot._view import View as View
 from reojax.plot.capture import comparison_figure as comparison_figure
+from reojax.plot.control import bandwidth_figure as bandwidth_figure, tracking_figure as tracking_figure
 from reojax.plot.files import FORMATS as FORMATS, check_picture as check_picture, save as save
 from reojax.plot.frames import (
     Frames as Frames,
