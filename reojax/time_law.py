@@ -42,6 +42,8 @@ def trapezoid(ramp: ArrayLike = 1 / 3) -> Law:
     r = as_numbers("ramp", ramp)
     if r.shape or (is_concrete(r) and not 0 < r <= 0.5):
         raise ValueError(f"`ramp` is {ramp}; it must be one number above 0 and at most 0.5.")
+    if is_concrete(r) and r == 0.5:  # two pieces, as the one between would take no time
+        return Law(np.array([0.0, 0.5, 1.0]), np.array([[0.0, 0, 2, 0, 0, 0], [0.5, 2, -2, 0, 0, 0]]))
     rate = 1 / (1 - r)
     xp = np if isinstance(r, np.ndarray | np.floating) else jnp
     zero, one = xp.zeros_like(r), xp.ones_like(r)

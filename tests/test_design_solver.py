@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from reojax.design import optimise
+from reojax.design import descend, optimise
 
 STARTS = np.random.default_rng(0).uniform(1, 5, (8, 4))
 
@@ -136,6 +136,20 @@ def test_nothing_is_compiled_twice():
         patch.setattr("logging.Logger.handle", lambda self, record: messages.append(record.getMessage()))
         optimise(product_cost, STARTS + 0.0, **HS71)
     assert not [m for m in messages if "Compiling" in m and "_advance" in m]
+
+
+def test_descent_in_a_box_with_a_kink():
+    """Least of |x - 1/3| + (y - 2)^2 in the unit box; a start where the cost is not finite is reported."""
+    kinked = lambda x, a: jnp.abs(x[0] - 1 / 3) + (x[1] - 2) ** 2 + jnp.log(a)
+    found = descend(kinked, [[0.9, 0.1], [0.1, 0.1]], lower=0, upper=1, data=np.array([1.0, -1.0]))
+    np.testing.assert_allclose(found.value[0], [1 / 3, 1], atol=1e-3)
+    np.testing.assert_allclose(found.cost[0], 1, atol=1e-3)
+    assert found.best == 0
+    assert np.isinf(found.cost[1])
+    with pytest.raises(ValueError, match=r"starts\[0, 0\] is 2"):
+        descend(jnp.sum, [2.0], lower=0, upper=1)
+    with pytest.raises(ValueError, match="`rate` is -1"):
+        descend(jnp.sum, [0.5], lower=0, upper=1, rate=-1)
 
 
 @pytest.mark.parametrize(

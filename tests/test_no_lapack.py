@@ -15,6 +15,7 @@ CALLS = {
     "momentum_matrices": lambda robot, path: reojax.momentum_matrices(robot, path[0]),
     "connection": lambda robot, path: reojax.connection(robot, path[0]),
     "angular_momentum": lambda robot, path: reojax.angular_momentum(robot, path[0], path[1], jnp.ones(3)),
+    "curvature": lambda robot, path: reojax.curvature(robot, path[0]),
     "net_rotation": lambda robot, path: reojax.net_rotation(robot, reojax.polygon(path)),
     "rotation_history": lambda robot, path: reojax.rotation_history(robot, reojax.polygon(path), samples=3),
 }

@@ -81,7 +81,7 @@ def optimise(
         ValueError: naming the argument, its value and the rule, for bounds the wrong way round, a start outside,
             wrong shapes, a cost that is not a scalar or constraints that are not vectors.
     """
-    x, bounds = _checked(starts, lower, upper, scale, data)
+    x, bounds = checked_starts(starts, lower, upper, scale, data)
     for entry, number in (("tolerance", tolerance), ("slope_tolerance", slope_tolerance)):
         if not np.isfinite(number) or number <= 0:
             raise ValueError(f"`{entry}` is {number!r}; it must be a positive number.")
@@ -198,7 +198,7 @@ def _solution(state: State, fixed: _Fixed) -> Solution:
     return Solution(x, cost, miss, slope, np.asarray(state.steps), converged, int(best))
 
 
-def _checked(starts: Any, lower: Any, upper: Any, scale: Any, data: Any) -> tuple[Array, dict[str, np.ndarray]]:
+def checked_starts(starts: Any, lower: Any, upper: Any, scale: Any, data: Any) -> tuple[Array, dict[str, np.ndarray]]:
     """Starts as (m, n), and bounds and sizes as (n,)."""
     x = np.asarray(as_numbers("starts", starts))
     x = x[None] if x.ndim == 1 else x

@@ -5,10 +5,13 @@ near the target and are solved; what is found is solved again on the true rotati
 start succeeds, so "not with fewer" is a numerical decision, not a proof.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from reojax.plan import quaternions
 from reojax.plan.attempts import SIZES, Rows, Scene, attempt, least, settle, shortened, starting_rows, travel
+from reojax.plan.grouped import grouped_rows, loops
 from reojax.plan.library import Starts
 
 LONGEST = 5
@@ -80,6 +83,8 @@ def fewest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> An
             missed = found.take(found.square >= _CLOSE)
             answer.offer(least(missed, missed.square))
             _offer_solved(scene, targets, answer, found, keep=1)
+    if most > LONGEST:
+        _with_small_loops(scene, targets, most, answer, loops)
     return answer
 
 
@@ -95,7 +100,25 @@ def cheapest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> 
         missed = found.take(found.square >= _CLOSE)
         answer.offer(least(missed, missed.square))
         _offer_solved(scene, targets, answer, found, keep=4)
+    if most > LONGEST:
+        _with_small_loops(scene, targets, most, answer, lambda rows: travel(scene.box, rows))
     return answer
+
+
+def _with_small_loops(
+    scene: Scene, targets: np.ndarray, most: int, answer: Answer, value: Callable[[Rows], np.ndarray]
+) -> None:
+    """Try words of many equal loops where nothing else reached the target; of the solved ones the least `value`."""
+    found = attempt(scene, targets, grouped_rows(scene, targets, np.flatnonzero(~answer.solved), most))
+    missed = found.take(found.square >= _CLOSE)
+    answer.offer(least(missed, missed.square))
+    found = found.take(found.square < _CLOSE)
+    best = least(found, value(found) + np.where(found.square > _EXACT, 1e6, 0.0), _AGAIN)
+    short = settle(scene, targets, shortened(scene, targets, best), answer.tolerance)
+    plain = settle(scene, targets, best, answer.tolerance)
+    for rows in (short, plain):
+        off = np.where(rows.square <= answer.tolerance**2, 0.0, 1e9)
+        answer.offer(least(rows, off + 1e3 * value(rows) + travel(scene.box, rows)))
 
 
 def _offer_solved(scene: Scene, targets: np.ndarray, answer: Answer, found: Rows, keep: int) -> None:

@@ -90,6 +90,7 @@ def frames_figure(
     titles: Sequence[str] | None = None,
     columns: int | None = None,
     view: View | None = None,
+    frames: Frames | None = None,
 ) -> Figure:
     """Draw a robot at the corners of a path, and `per_edge - 1` times between two, as a row of 3-D frames.
 
@@ -101,11 +102,13 @@ def frames_figure(
         titles: a line above each frame; default where along the path, in edges.
         columns: frames in one row; default all.
         view: from where to look; default from the front, y up.
+        frames: the `frames_along` of the path with this `per_edge`, if they are known already.
 
     Raises:
         ValueError: if the path does not fit the robot, or numbers of frames and titles differ.
     """
-    frames = frames_along(robot, path, per_edge=per_edge)
+    if frames is None:
+        frames = frames_along(robot, path, per_edge=per_edge)
     count = len(frames.theta)
     if titles is None:
         titles = [f"edge {k / per_edge:g}" for k in range(count)] if count > 1 else [""]
@@ -114,7 +117,7 @@ def frames_figure(
     figure = Figure(figsize=(1.9 * columns, 1.9 * rows + 0.4), facecolor="white")
     top = 1 - 0.4 / (1.9 * rows + 0.4)
     axes = figure.subplots(rows, columns, squeeze=False, subplot_kw={"projection": "3d"}).ravel()
-    figure.subplots_adjust(left=0.0, right=1.0, bottom=0.0, top=top - 0.03 / rows, wspace=0.0, hspace=0.08)
+    figure.subplots_adjust(left=0.0, right=1.0, bottom=0.0, top=top - 0.03 / rows, wspace=0.0, hspace=0.12)
     for spare in axes[count:]:
         spare.set_axis_off()
     draw_frames(list(axes[:count]), robot, frames, titles=titles, view=view)
@@ -258,4 +261,4 @@ def _directions(axes: Axes3D, low: np.ndarray, high: np.ndarray) -> None:
     length = decade * max(step for step in (1, 2, 5) if step * decade <= 0.3 * half)
     draw_axes(axes, length, at=(low + high) / 2 + camera.T @ np.array([-0.8 * half, -0.85 * half, 0.0]))
     text = f"{1000 * length:g} mm" if length < 1 else f"{length:g} m"
-    axes.text2D(0.22, 0.02, f"x, y, z: {text}", transform=axes.transAxes, fontsize=7, color=INK)
+    axes.text2D(0.24, 0.07, f"x, y, z: {text}", transform=axes.transAxes, fontsize=7, color=INK)

@@ -52,8 +52,8 @@ def identity(
 
 
 def digest(same: Mapping[str, Any]) -> str:
-    """Return one hash of an identity; every chunk carries it."""
-    return _sha256(json.dumps(same, sort_keys=True).encode())
+    """Return one hash of an identity; every chunk carries it. Robots are in the function, whatever their names."""
+    return _sha256(json.dumps({**same, "robots": None}, sort_keys=True).encode())
 
 
 def differences(stored: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
@@ -68,6 +68,7 @@ def differences(stored: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
             ("order", "axes"),
             ("zipped", "zipped"),
             ("chunk", "chunk size"),
+            ("block", "block size"),
         )
         if stored.get(key) != now[key]
     ]

@@ -14,6 +14,7 @@ import os
 import time
 import zipfile
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,10 @@ class Store:
         """Path of a chunk."""
         return self.folder / f"chunk-{number:08d}.npz"
 
+    def has(self, number: int) -> bool:
+        """Tell whether the file of a chunk is there."""
+        return self.file(number).exists()
+
     def put(self, chunk: Chunk) -> None:
         """Write a chunk, whole or not at all."""
         start, stop = self.sizes.bounds(chunk.number)
@@ -70,6 +75,8 @@ class Store:
 
     def get(self, number: int) -> Chunk | None:
         """Read a chunk; None if it is not there, damaged, or of another sweep."""
+        if not self.has(number):
+            return None
         start, stop = self.sizes.bounds(number)
         try:
             with self.file(number).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
@@ -105,10 +112,9 @@ def create(
     except OSError as error:
         raise ValueError(f"cannot use {str(folder)!r} as a store: {error.strerror or error}.") from error
     store = open_store(place)
-    if other := differences(store.identity, same):
-        raise ValueError(f"the store {str(folder)!r} holds another sweep: {'; '.join(other)}. Choose another folder.")
     if store.hash != digest(same):
-        raise ValueError(f"the store {str(folder)!r} holds another sweep. Choose another folder.")
+        other = "; ".join(differences(store.identity, same))
+        raise ValueError(f"the store {str(folder)!r} holds another sweep: {other}. Choose another folder.")
     return store
 
 
@@ -148,8 +154,9 @@ def _write_once(path: Path, text: str) -> None:
 def _sweep_out(folder: Path) -> None:
     """Remove temporary files that killed processes have left."""
     for file in folder.glob(".reojax-*"):
-        if time.time() - file.stat().st_mtime > _LEFT_OVER:
-            file.unlink(missing_ok=True)
+        with suppress(FileNotFoundError):  # another process has just renamed it
+            if time.time() - file.stat().st_mtime > _LEFT_OVER:
+                file.unlink()
 
 
 def _text(error: Exception) -> str:

@@ -144,7 +144,7 @@ class Sweep:
             ValueError: if the file cannot be read, or is not a saved sweep.
         """
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
                 about = json.loads(str(file["about"]))
                 if about["schema"] != SCHEMA:
                     raise ValueError(f"its layout is {about['schema']!r}; this reojax reads {SCHEMA!r}")
