@@ -1,6 +1,6 @@
 """Does the model do what the thesis says it does? Every figure of its simulations, and every claim with a verdict.
 
-    python experiments/thesis_figures.py                # about a minute on 2 cores; --quick: coarser
+    python experiments/thesis_figures.py        # about a minute of processor time; --quick: coarser, fewer claims
 
 Figures 1.5 and 2.7 to 2.10: the thesis's own grids, drawn as it draws them, and finer ones as contours and lines.
 Figures 2.5 and 2.6: the robot along manoeuvres A and B, as rows of frames and as GIFs. Figure 1.9: ZXZ and joint
@@ -8,9 +8,10 @@ angles. Then a picture that the thesis does not have: the curvature of the local
 and how well its surface integral predicts the net rotation of loops of all sizes, in the base frame and in the frame in
 which the connection is smallest.
 
-Expected: all that the thesis says of figures 2.5 to 2.10 holds. Not so for the prototype: growth of A as
-twist * bend^2 at small amplitudes, the sign of the bend, and a third ZXZ angle that returns to zero. The surface
-integral in the best frame is within 3 degrees of A's half turn, in the base frame off by 46.
+Expected: all that the thesis says of figures 2.5 to 2.10 holds. Four claims do not hold for the prototype as it is here:
+growth of A as twist * bend^2 at small amplitudes, the sign of the bend, a third ZXZ angle that returns to zero, and the
+centre joint's motor of figure 3.2. The surface integral in the best frame is within 3 degrees of A's half turn, in the
+base frame it is off by 46.
 """
 
 from pathlib import Path

@@ -302,3 +302,17 @@ def test_bad_input_is_one_line_and_status_2(capsys, monkeypatch, tmp_path, argum
     assert complaint.startswith(message)
     assert complaint.count("\n") == 1
     assert os.listdir(tmp_path) == []
+
+
+def test_a_planned_manoeuvre_is_compared_too(capsys, monkeypatch):
+    """The shipped capture against the plan it was made with: the start is found, the joints are their noise off."""
+    monkeypatch.setenv("REOJAX_CACHE", "0")
+    plan = ["--manoeuvre", "a", "--duration", "0.1,0.2,0.1,0.2"]
+    assert main(["compare", str(SHIPPED), *plan, "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["offset_found"]
+    assert report["offset_s"] == pytest.approx(0.18, abs=2e-4)
+    np.testing.assert_allclose(report["rms_theta_rad"], np.deg2rad(0.1), rtol=0.15)
+    assert report["config"]["simulated_from"] == "manoeuvre A, twist 270 deg, bend 120 deg, quintic"
+    assert main(["compare", str(SHIPPED), "--manoeuvre", "a"]) == 2
+    assert "--duration is missing" in capsys.readouterr().err

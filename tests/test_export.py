@@ -7,7 +7,8 @@ import os
 import numpy as np
 import pytest
 
-from reojax import robots
+from reojax import read_capture, robots
+from reojax.cli import main
 from reojax.export import check_trajectory, write_trajectory
 
 ROBOT = robots.prototype().replace(joint_names=("twist1", "bend, centre", "twist2"))
@@ -90,4 +91,44 @@ def test_bad_input_writes_nothing(monkeypatch, tmp_path, changed, message):
 
 def test_a_place_can_be_asked_for_beforehand(tmp_path):
     assert check_trajectory(tmp_path / "t.yaml") == tmp_path / "t.yaml"
+    assert os.listdir(tmp_path) == []
+
+
+def test_the_command_line_writes_what_it_says(capsys, monkeypatch, tmp_path):
+    """A manoeuvre as a file for a controller, and as one that `compare` can read."""
+    monkeypatch.setenv("REOJAX_CACHE", "0")
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "a.yaml", "--duration", "0.1", "--rate", "100", "--bend", "60"]) == 0
+    assert capsys.readouterr().out == "41 points in 0.4 s, written to a.yaml\n"
+    message = json.loads((tmp_path / "a.yaml").read_text())
+    np.testing.assert_allclose(message["points"][10]["positions"], [0, np.deg2rad(60), 0], atol=1e-12)
+    assert main(["export", "a.csv", "--duration", "0.1,0.2,0.1,0.2", "--torques", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["points"] == 121
+    capture = read_capture(tmp_path / "a.csv", robots.prototype())
+    np.testing.assert_allclose(capture.theta[60], np.deg2rad([270, 120, -270]), rtol=1e-11)
+    assert capture.ignored[-1] == "torque twist2 [N m]"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["a.yaml"], "reojax export: --duration is missing"),
+        (["a.yaml", "--duration", "0"], "reojax export: argument --duration: '0' must be positive and finite"),
+        (["a.yaml", "--duration", "1,x"], "reojax export: argument --duration: '1,x' is not a number"),
+        (["a.yaml", "--duration", "1,2"], "reojax export: `durations` has shape (2,)"),
+        (["a.yaml", "--duration", "1", "--law", "jump"], "reojax export: there is no time law named 'jump'"),
+        (["a.yaml", "--duration", "1", "--rate", "0"], "reojax export: argument --rate: '0' must be positive"),
+        (["a.yaml", "--duration", "1e9"], "reojax export: 4e+09 s at 200 Hz are 800000000000 points"),
+        (["a.bag", "--duration", "1"], "reojax export: cannot write 'a.bag': the name of a trajectory"),
+        (["a.csv", "--duration", "1", "--robot", "planar2"], "reojax export: 'planar2' has 1 joints"),
+    ],
+)
+def test_bad_arguments_are_one_line_and_status_2(capsys, monkeypatch, tmp_path, arguments, message):
+    monkeypatch.setenv("REOJAX_CACHE", "0")
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", *arguments]) == 2
+    out, complaint = capsys.readouterr()
+    assert out == ""
+    assert complaint.startswith(message)
+    assert complaint.count("\n") == 1
     assert os.listdir(tmp_path) == []

@@ -1,6 +1,7 @@
 """Sweeps on disk: killed, resumed, shared, damaged, and mistaken for one another."""
 
 import json
+import os
 import random
 import signal
 import subprocess
@@ -145,8 +146,8 @@ def test_shards_make_up_the_sweep(tmp_path):
 
 
 def test_bad_designs_are_remembered(tmp_path):
-    function = lambda x, y: jnp.log(x) * y
-    designs = [{"x": 0.0, "y": 1.0}, {"x": 0.0, "y": 2.0}]
+    function = lambda x, y: jnp.log(5 - x) * y
+    designs = [{"x": 5.0, "y": 1.0}, {"x": 5.0, "y": 2.0}]  # in the last chunk
     for _ in range(2):
         assert [bad.design for bad in small(tmp_path / "s", function).bad] == designs
     merged = merge(tmp_path / "s")
@@ -213,3 +214,12 @@ def test_a_folder_that_is_no_store(tmp_path, damage):
     (tmp_path / "file").touch()
     with pytest.raises(ValueError, match="cannot use .* as a store"):
         small(tmp_path / "file")
+
+
+def test_what_a_killed_process_left_is_removed(tmp_path):
+    """Not what another one may be writing just now."""
+    for name, age in (("old", 1e4), ("new", 0)):
+        (tmp_path / f".reojax-{name}").touch()
+        os.utime(tmp_path / f".reojax-{name}", (time.time() - age,) * 2)
+    small(tmp_path)
+    assert [file.name for file in tmp_path.glob(".reojax-*")] == [".reojax-new"]

@@ -6,11 +6,12 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, version
+from reojax.cli._planned import add_plan, planned
 
 if TYPE_CHECKING:
     from reojax.calibrate import Calibration
     from reojax.capture import Capture
-    from reojax.comparison import Comparison
+    from reojax.comparison import Comparison, Sampled
     from reojax.robot import Robot
 
 
@@ -19,6 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("capture", metavar="CAPTURE.csv", help="time, joint angles and/or orientation of link 1; see docs/captures.md")
     add("--robot", default="prototype", metavar="NAME", help="robot; a wrong name lists them [%(default)s]")
+    add_plan(parser, manoeuvre=None)
     add("--angles", choices=("deg", "rad"), help="unit of angles whose header does not say it")
     add("--offset", type=float, metavar="S", help="time of the capture at which the motion starts [fitted]")
     fitted = "fit these numbers of the robot to the capture first, such as end_inertia,rotor_inertia or com[0,2]"
@@ -71,13 +73,14 @@ def _report(
     if args.calibrate is not None:
         fit = calibrate(robot, capture, _names(args.calibrate))
         robot = fit.robot
-    comparison = compare(robot, capture, offset=args.offset)
+    motion, source = _motion(robot, args)
+    comparison = compare(robot, capture, motion, offset=args.offset)
     seen = np.flatnonzero(capture.seen_rotation)
     last = int(seen[-1]) if seen.size else len(capture.time) - 1
     report = {
         "command": "compare",
         "version": version(),
-        "config": {"capture": args.capture, "robot": args.robot, "simulated_from": "the measured joint angles"},
+        "config": {"capture": args.capture, "robot": args.robot, "simulated_from": source},
         "frames": len(capture.time),
         "frames_with_orientation": int(seen.size),
         "frames_with_all_joints": int(capture.seen_theta.all(axis=1).sum()) if capture.theta is not None else 0,
@@ -98,6 +101,23 @@ def _report(
         "picture": args.out,
     }
     return report, robot, comparison
+
+
+def _motion(robot: "Robot", args: argparse.Namespace) -> tuple["Sampled | None", str]:
+    """The planned motion, None where the measured joints take its place; and its name."""
+    if args.manoeuvre is None:
+        return None, "the measured joint angles"
+    import jax
+    import numpy as np
+
+    from reojax.comparison import Sampled
+    from reojax.release import released
+
+    trajectory = planned(robot, args)
+    motion = released(robot, trajectory, steps=64)
+    theta = jax.vmap(trajectory.at)(motion.time).theta
+    name = f"manoeuvre {args.manoeuvre.upper()}, twist {args.twist:g} deg, bend {args.bend:g} deg, {args.law}"
+    return Sampled(*(np.asarray(x, float) for x in (motion.time, theta, motion.rotation))), name
 
 
 def _names(text: str) -> list[str]:

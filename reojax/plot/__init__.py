@@ -6,6 +6,7 @@ and `animation` write files. Robots are drawn from their numbers, see `reojax.pl
 
 from reojax.plot._view import View as View
 from reojax.plot.capture import comparison_figure as comparison_figure
+from reojax.plot.control import bandwidth_figure as bandwidth_figure, tracking_figure as tracking_figure
 from reojax.plot.files import FORMATS as FORMATS, check_picture as check_picture, save as save
 from reojax.plot.frames import (
     Frames as Frames,
@@ -27,5 +28,6 @@ from reojax.plot.maps import (
     draw_map as draw_map,
     draw_poses as draw_poses,
 )
+from reojax.plot.plans import plan_figure as plan_figure
 from reojax.plot.robots import draw_axes as draw_axes, draw_robot as draw_robot, draw_robot_flat as draw_robot_flat
 from reojax.plot.sweeps import sweep_figure as sweep_figure

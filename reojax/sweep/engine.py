@@ -12,7 +12,7 @@ from jax.sharding import Mesh
 from reojax.sweep.chunks import Chunk, Program, compiled
 from reojax.sweep.outputs import Outputs, bad_rows, blank
 
-IN_FLIGHT = 2
+IN_FLIGHT = 1
 """Calls under way while the results of an earlier one are put away."""
 
 

@@ -14,6 +14,7 @@ import os
 import time
 import zipfile
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -153,8 +154,9 @@ def _write_once(path: Path, text: str) -> None:
 def _sweep_out(folder: Path) -> None:
     """Remove temporary files that killed processes have left."""
     for file in folder.glob(".reojax-*"):
-        if time.time() - file.stat().st_mtime > _LEFT_OVER:
-            file.unlink(missing_ok=True)
+        with suppress(FileNotFoundError):  # another process has just renamed it
+            if time.time() - file.stat().st_mtime > _LEFT_OVER:
+                file.unlink()
 
 
 def _text(error: Exception) -> str:
