@@ -8,7 +8,7 @@ angles. Then a picture that the thesis does not have: the curvature of the local
 and how well its surface integral predicts the net rotation of loops of all sizes, in the base frame and in the frame in
 which the connection is smallest.
 
-Expected: all that the thesis says of figures 2.5 to 2.10 holds. Four claims do not, for the prototype as built here:
+Expected: all that the thesis says of figures 2.5 to 2.10 holds. Four claims do not hold for the prototype as it is:
 growth of A as twist * bend^2 at small amplitudes, the sign of the bend, a third ZXZ angle that returns to zero, and the
 centre joint's motor of figure 3.2. The surface integral in the best frame is within 3 degrees of A's half turn, in the
 base frame it is off by 46.
