@@ -1,6 +1,7 @@
 """Sweeps on disk: killed, resumed, shared, damaged, and mistaken for one another."""
 
 import json
+import os
 import random
 import signal
 import subprocess
