@@ -85,7 +85,7 @@ def best_loops(roll: float, *, quick: bool) -> list[dict[str, Any]]:
         found = problem.solve(starts, seed=1, hold={"target": target}, progress=loop.name, max_steps=100)
         answers.append(summary(problem, loop, found, target, steps=steps))
     corners = [np.deg2rad(answer["waypoints_deg"]) for answer in answers]
-    for answer, error in zip(answers, gradient_error(robot, corners, steps=4 if quick else 2), strict=True):
+    for answer, error in zip(answers, gradient_error(robot, corners, steps=4), strict=True):
         answer["gradient_error"] = error
     return answers
 
