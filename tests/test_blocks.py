@@ -91,3 +91,18 @@ def test_net_rotations_and_gradients_in_blocks():
     whole, few = slopes(robot, corners), slopes(robot, corners[-8:])
     for a, b in zip(jax.tree.leaves(whole), jax.tree.leaves(few), strict=True):
         np.testing.assert_allclose(a[-8:], b, rtol=1e-12, atol=1e-13)
+
+
+def test_a_robot_without_data():
+    """All of its numbers are known zeros and ones: the same rotation and slope as with the numbers given as data."""
+    ones = reojax.make_robot(
+        mass=[1, 1], com=np.zeros((2, 3)), inertia=[np.eye(3)] * 2, axis=[[0, 0, 1]], anchor=[[1, 0, 0]]
+    )
+
+    def roll(robot, angle):
+        return reojax.so3.log(reojax.net_rotation(robot, reojax.polygon([[0.0], [angle]]), steps=1))[2]
+
+    known = jax.value_and_grad(lambda angle: roll(ones, angle))(1.2)
+    given = jax.jit(jax.value_and_grad(roll, argnums=1))(ones, 1.2)
+    np.testing.assert_allclose(known, given, rtol=1e-14)
+    assert abs(known[0]) > 0.1

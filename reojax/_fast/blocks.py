@@ -73,7 +73,7 @@ def _shapes(*avals, call: Call, batched: tuple[bool, ...], size: int | None) -> 
     """Through a function with the same results in shape and dtype, and cheap to trace."""
 
     def like(*args):
-        zero = sum(0 * x.ravel()[0] for x in args)
+        zero = sum(0 * x.sum() for x in args)
         return [jnp.broadcast_to(zero, shape if size is None else (size, *shape)) for shape in call.shapes]
 
     return list(jax.make_jaxpr(like)(*avals).out_avals)
@@ -117,7 +117,7 @@ def _jvp(primals, tangents, **of_call):
 
 def _transpose(cotangents, *args, call: Call, batched: tuple[bool, ...], size: int | None):
     fixed, linear = args[: -call.linear], args[-call.linear :]
-    assert call.transpose is not None and all(ad.is_undefined_primal(x) for x in linear)
+    assert call.transpose is not None
     given = [ad.instantiate_zeros(c) for c in cotangents]
     back = Call(
         function=call.transpose,

@@ -7,7 +7,9 @@ at a fixed motion of the base: nothing of the inverse has to be differentiated. 
 motion being zero, its reference point and velocity may stay fixed too (their first-order effects cancel).
 The sum uses the nodes and values of the solution itself.
 Reverse mode is the transpose of this, which JAX finds: one constant vector turned into each node's frame, `A^-1`,
-and one pass through the momentum.
+and one pass through the momentum. It computes the values at the nodes again, block by block (`blocks`): keeping
+them from the first pass would take as long, and memory for all designs. What it is by are the masses, moments and so
+on of `components`; from there to the arrays of a robot JAX differentiates as usual.
 """
 
 from functools import partial
@@ -66,7 +68,7 @@ def end_rotation(robot: Components, points: jax.Array, steps: int) -> jax.Array:
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _end_rotation(problem: Problem, numbers: list[jax.Array], points: jax.Array) -> jax.Array:
     call = Call(_rotation, problem, ((3, 3),), _nodes(problem, points))
-    return in_blocks(call, jnp.stack(numbers), points)[0]
+    return in_blocks(call, _together(numbers, points), points)[0]
 
 
 @partial(_end_rotation.defjvp, symbolic_zeros=True)
@@ -80,7 +82,7 @@ def _end_rotation_jvp(problem, primals, tangents):
     if not changes:
         return rotation, jnp.zeros_like(rotation)
     call = Call(_push, problem, ((3,),), _nodes(problem, points), transpose=_pull, linear=len(changes))
-    turn = in_blocks(call, jnp.stack(numbers), points, *changes)[0]
+    turn = in_blocks(call, _together(numbers, points), points, *changes)[0]
     return rotation, jnp.cross(turn[:, None], rotation, axis=0)
 
 
@@ -135,9 +137,13 @@ def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.
     return list(push(by_turn))
 
 
+def _together(numbers: list[jax.Array], like: jax.Array) -> jax.Array:
+    return jnp.stack(numbers) if numbers else jnp.zeros(0, like.dtype)
+
+
 def _apart(numbers: jax.Array) -> list[jax.Array]:
     # `split`, unlike indexing, has a cheap transpose: one concatenation
-    return [x.reshape(()) for x in jax.lax.split(numbers, (1,) * numbers.size)]
+    return [x.reshape(()) for x in jax.lax.split(numbers, (1,) * numbers.size)] if numbers.size else []
 
 
 def _at_nodes(vector, like: jax.Array) -> Triple:
