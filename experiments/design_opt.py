@@ -47,7 +47,7 @@ def main(out: Path, *, quick: bool = False, target: float = 180.0) -> dict:
     curves = trade_off(np.deg2rad(target), points=5 if quick else 13)
 
     print(f"\nPrototype turned by {target:g} deg of roll, all three components, least joint travel within 270/120\n")
-    rows = ("starts", "converged", "starts_at_best", "travel_deg", "residual_rad", "slope", "miss_off_axis_rad",
+    rows = ("starts", "starts_converged", "starts_at_best", "travel_deg", "residual_rad", "slope", "miss_off_axis_rad",
             "replay_rad", "gradient_error")  # fmt: skip
     table(["", *(loop["loop"] for loop in loops)], [[row, *(loop[row] for loop in loops)] for row in rows], width=26)
     print("\nManoeuvre A, roll as wanted: least travel [deg] over one parameter, the other as in the thesis, or free\n")

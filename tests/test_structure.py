@@ -59,11 +59,11 @@ LAYERS = [
     ["calibrate"],
     ["plot._style", "plot.files", "plot._view", "plot._solids"],
     ["plot.history", "plot.robots", "plot.capture", "plot.control", "plot.sweeps"],
-    ["plot.frames", "plot.maps"],
+    ["plot.frames", "plot.maps", "plot.plans"],
     ["plot"],
     ["cli._arguments"],
     ["cli._axes", "cli._results", "cli._planned"],
-    ["cli.simulate", "cli.compare", "cli.export", "cli.sweep", "cli.merge"],
+    ["cli.simulate", "cli.compare", "cli.export", "cli.sweep", "cli.merge", "cli.plan"],
     ["cli"],
     ["__init__", "__main__"],
 ]

@@ -28,5 +28,6 @@ from reojax.plot.maps import (
     draw_map as draw_map,
     draw_poses as draw_poses,
 )
+from reojax.plot.plans import plan_figure as plan_figure
 from reojax.plot.robots import draw_axes as draw_axes, draw_robot as draw_robot, draw_robot_flat as draw_robot_flat
 from reojax.plot.sweeps import sweep_figure as sweep_figure
