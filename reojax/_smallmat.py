@@ -58,5 +58,43 @@ def cholesky_solve(lower: Float[Array, "n n"], right: Float[Array, "n ..."]) -> 
     return jnp.stack(solution[::-1])
 
 
+def factored(matrix: Float[Array, "n n"]) -> Float[Array, "n n"]:
+    """Upper triangular `U` of `U.T @ U = matrix`, symmetric positive definite, for `solve_factored`.
+
+    A loop, not unrolled: short to compile at any n. Where rounding has left nothing of a pivot, it becomes so large
+    that this component of a solution is 0: the factor is always finite.
+    """
+    matrix = jnp.asarray(matrix)
+    n = matrix.shape[0]
+    least = 30 * jnp.finfo(matrix.dtype).eps * jnp.abs(jnp.diagonal(matrix))
+    huge = jnp.sqrt(jnp.sqrt(jnp.finfo(matrix.dtype).max))
+
+    def column(k: jax.Array, carry: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
+        rest, upper = carry
+        row = jnp.where(jnp.arange(n) >= k, rest[k], 0.0)
+        gone = row[k] <= least[k]
+        row = jnp.where(gone, 0.0, row / jnp.sqrt(jnp.where(gone, 1.0, row[k])))
+        return rest - row[:, None] * row[None, :], upper.at[k].set(row.at[k].max(jnp.where(gone, huge, 0.0)))
+
+    return jax.lax.fori_loop(0, n, column, (matrix, jnp.zeros_like(matrix)))[1]
+
+
+def solve_factored(upper: Float[Array, "n n"], right: Float[Array, " n"]) -> Float[Array, " n"]:
+    """Solve `U.T @ U @ x = right` for an upper triangular `U`, in loops."""
+    upper, right = jnp.asarray(upper), jnp.asarray(right)
+    n = right.shape[0]
+
+    def forward(k: jax.Array, rest: jax.Array) -> jax.Array:
+        value = rest[k] / upper[k, k]
+        return (rest - jnp.where(jnp.arange(n) > k, upper[k], 0.0) * value).at[k].set(value)
+
+    def backward(i: jax.Array, rest: jax.Array) -> jax.Array:
+        k = n - 1 - i
+        behind = jnp.where(jnp.arange(n) > k, upper[k] * rest, 0.0).sum()
+        return rest.at[k].set((rest[k] - behind) / upper[k, k])
+
+    return jax.lax.fori_loop(0, n, backward, jax.lax.fori_loop(0, n, forward, right))
+
+
 def _outer(column: Array, row: jax.Array) -> jax.Array:
     return jnp.multiply(column.reshape(-1, *(1,) * row.ndim), row[None])

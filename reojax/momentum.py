@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from reojax._arrays import Array, as_numbers, common_float, is_concrete
 from reojax._smallmat import solve_symmetric3
@@ -54,12 +54,12 @@ class MomentumMatrices(NamedTuple):
     """Minus the momentum that unit joint rates give while the base does not turn."""
 
 
-def _checked(robot: Robot, **motion: Any) -> Any:
+def checked(robot: Robot, **motion: Any) -> Any:
     """Return the robot and the motion's vectors as arrays of one dtype, or raise a `ValueError`."""
     if not isinstance(robot, Robot):
         raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
     for entry, value in motion.items():
-        expected = (3,) if entry == "omega" else (robot.joints,)
+        expected = (3,) if entry in ("omega", "momentum") else (robot.joints,)
         vector = motion[entry] = as_numbers(entry, value)
         if vector.shape != expected:
             robot_size = f"{robot.name!r} ({robot.joints} joints)"
@@ -83,30 +83,36 @@ def kinematics(robot: Robot, theta: Float[Array, " j"]) -> Kinematics:
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
-    robot, theta = _checked(robot, theta=theta)
-    zero = jnp.zeros((3, robot.joints), theta.dtype)
-    rotation, origin, axis = [jnp.eye(3, dtype=theta.dtype)], [zero[:, :0].sum(1)], []
-    turn, shift = [zero], [zero]  # `shift` of the link's origin, base at rest
-    for k, p in enumerate(robot.parent):
-        unit = robot.axis[k] / jnp.sqrt(robot.axis[k] @ robot.axis[k])
-        axis.append(rotation[p] @ unit)
-        arm = rotation[p] @ robot.anchor[k]
-        rotation.append(rotation[p] @ joint_rotation(unit, theta[k]))
-        origin.append(origin[p] + arm)
-        turn.append(turn[p].at[:, k].set(axis[k]))
-        shift.append(shift[p] - hat(arm) @ turn[p])
-    lever = [r @ c for r, c in zip(rotation, robot.com, strict=True)]
-    centre = jnp.stack([o + d for o, d in zip(origin, lever, strict=True)])
-    centre_shift = jnp.stack([s - hat(d) @ t for s, d, t in zip(shift, lever, turn, strict=True)])
+    robot, theta = checked(robot, theta=theta)
+    unit = robot.axis / jnp.sqrt((robot.axis * robot.axis).sum(1, keepdims=True))
+    rotation = [jnp.eye(3, dtype=theta.dtype)]
+    for p, turned in zip(robot.parent, jax.vmap(joint_rotation)(unit, theta), strict=True):
+        rotation.append(rotation[p] @ turned)
+    rotation = jnp.stack(rotation)
+    parent, moved = np.array(robot.parent, int), carried(robot).astype(theta.dtype)
+    axis = jnp.einsum("kab,kb->ka", rotation[parent], unit)
+    origin = moved @ jnp.einsum("kab,kb->ka", rotation[parent], robot.anchor)
+    centre = origin + jnp.einsum("iab,ib->ia", rotation, robot.com)
+    arm = centre[:, None, :] - origin[None, 1:, :]
+    shift = moved[:, None, :] * jnp.cross(axis[None], arm).swapaxes(1, 2)
     share = robot.mass / robot.mass.sum()
     return Kinematics(
-        rotation=jnp.stack(rotation),
-        origin=jnp.stack(origin),
+        rotation=rotation,
+        origin=origin,
         centre=centre - (share @ centre)[None],
-        turn=jnp.stack(turn),
-        shift=centre_shift - jnp.einsum("i,iaj->aj", share, centre_shift)[None],
-        axis=jnp.stack(axis) if axis else jnp.zeros((0, 3), theta.dtype),
+        turn=moved[:, None, :] * axis.T[None],
+        shift=shift - jnp.einsum("i,iaj->aj", share, shift)[None],
+        axis=axis,
     )
+
+
+def carried(robot: Robot) -> Bool[np.ndarray, "n j"]:
+    """Tell which links each joint moves: `[i, k]` where joint k lies between the base and link i."""
+    moved = np.zeros((robot.links, robot.joints), bool)
+    for k, p in enumerate(robot.parent):
+        moved[k + 1] = moved[p]
+        moved[k + 1, k] = True
+    return moved
 
 
 def momentum_matrices(robot: Robot, theta: Float[Array, " j"]) -> MomentumMatrices:
@@ -122,19 +128,28 @@ def momentum_matrices(robot: Robot, theta: Float[Array, " j"]) -> MomentumMatric
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
-    robot, theta = _checked(robot, theta=theta)
-    pose = kinematics(robot, theta)
-    A = jnp.zeros((3, 3), theta.dtype)
-    B = jnp.zeros((3, robot.joints), theta.dtype)
-    for i in range(robot.links):
-        inertia = pose.rotation[i] @ (0.5 * (robot.inertia[i] + robot.inertia[i].T)) @ pose.rotation[i].T
-        lever = hat(pose.centre[i])
-        A = A + inertia - robot.mass[i] * lever @ lever
-        B = B - inertia @ pose.turn[i] - robot.mass[i] * lever @ pose.shift[i]
-    for k, side in enumerate(robot.rotor_on):
-        spin = robot.gear_ratio[k] if side == "parent" else -robot.gear_ratio[k]
-        B = B.at[:, k].add(-robot.rotor_inertia[k] * spin * pose.axis[k])
-    return MomentumMatrices(A, B)
+    robot, theta = checked(robot, theta=theta)
+    return matrices_at(robot, kinematics(robot, theta))
+
+
+def matrices_at(robot: Robot, pose: Kinematics) -> MomentumMatrices:
+    """`momentum_matrices` where the poses and Jacobians are known already."""
+    inertia = outer_inertia(robot, pose)
+    lever = jax.vmap(hat)(pose.centre)
+    A = (inertia - jnp.einsum("i,iab,ibc->iac", robot.mass, lever, lever)).sum(0)
+    B = -jnp.einsum("iab,ibk->ak", inertia, pose.turn) - jnp.einsum("i,iab,ibk->ak", robot.mass, lever, pose.shift)
+    return MomentumMatrices(A, B - pose.axis.T * (robot.rotor_inertia * rotor_spin(robot))[None])
+
+
+def outer_inertia(robot: Robot, pose: Kinematics) -> Float[Array, "n 3 3"]:
+    """Inertia of each link about its centre of mass, in the base frame [kg m^2]."""
+    symmetric = 0.5 * (robot.inertia + robot.inertia.swapaxes(1, 2))
+    return jnp.einsum("iab,ibc,idc->iad", pose.rotation, symmetric, pose.rotation)
+
+
+def rotor_spin(robot: Robot) -> Float[Array, " j"]:
+    """Turns of each rotor about its joint's axis, relative to the stator's link, per turn of the joint."""
+    return robot.gear_ratio * np.array([1 if side == "parent" else -1 for side in robot.rotor_on], int)
 
 
 def connection(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "3 j"]:
@@ -163,6 +178,6 @@ def angular_momentum(
     Raises:
         ValueError: if an argument has the wrong shape or is not finite.
     """
-    robot, theta, theta_dot, omega = _checked(robot, theta=theta, theta_dot=theta_dot, omega=omega)
+    robot, theta, theta_dot, omega = checked(robot, theta=theta, theta_dot=theta_dot, omega=omega)
     A, B = momentum_matrices(robot, theta)
     return A @ omega - B @ theta_dot

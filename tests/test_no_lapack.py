@@ -15,6 +15,7 @@ CALLS = {
     "momentum_matrices": lambda robot, path: reojax.momentum_matrices(robot, path[0]),
     "connection": lambda robot, path: reojax.connection(robot, path[0]),
     "angular_momentum": lambda robot, path: reojax.angular_momentum(robot, path[0], path[1], jnp.ones(3)),
+    "curvature": lambda robot, path: reojax.curvature(robot, path[0]),
     "net_rotation": lambda robot, path: reojax.net_rotation(robot, reojax.polygon(path)),
     "rotation_history": lambda robot, path: reojax.rotation_history(robot, reojax.polygon(path), samples=3),
 }
@@ -50,6 +51,21 @@ def test_values(name):
 @pytest.mark.parametrize("name", CALLS)
 def test_derivatives(name, mode):
     function, arguments = batched(mode(total(CALLS[name]), argnums=(0, 1)))
+    text = program(function, *arguments)
+    assert "stablehlo" in text
+    assert "lapack_" not in text
+
+
+PLAN = reojax.Trajectory(np.array([0.0, 0.002]), CORNERS[None])
+LOOPS = {
+    "released": lambda robot, path: reojax.released(robot, PLAN, reojax.Release((*path[1], 1.0)), steps=2),
+    "track": lambda robot, path: reojax.track(robot, PLAN, reojax.RE_MAX_17, reojax.Gains(*path[1] ** 2, 1.0)),
+}
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_values_of_loops_over_time(name):
+    function, arguments = batched(LOOPS[name])
     text = program(function, *arguments)
     assert "stablehlo" in text
     assert "lapack_" not in text

@@ -1,6 +1,7 @@
 """Sweeps on disk: killed, resumed, shared, damaged, and mistaken for one another."""
 
 import json
+import os
 import random
 import signal
 import subprocess
@@ -17,6 +18,7 @@ import sweep_child
 
 import reojax
 from reojax.sweep import merge
+from reojax.sweep.store import Store
 
 CHILD = Path(sweep_child.__file__)
 AXES = {"x": np.arange(6.0), "y": np.array([1.0, 2.0])}
@@ -144,8 +146,8 @@ def test_shards_make_up_the_sweep(tmp_path):
 
 
 def test_bad_designs_are_remembered(tmp_path):
-    function = lambda x, y: jnp.log(x) * y
-    designs = [{"x": 0.0, "y": 1.0}, {"x": 0.0, "y": 2.0}]
+    function = lambda x, y: jnp.log(5 - x) * y
+    designs = [{"x": 5.0, "y": 1.0}, {"x": 5.0, "y": 2.0}]  # in the last chunk
     for _ in range(2):
         assert [bad.design for bad in small(tmp_path / "s", function).bad] == designs
     merged = merge(tmp_path / "s")
@@ -187,7 +189,7 @@ def test_two_processes_share_a_store(tmp_path):
 
 
 def test_ctrl_c_keeps_what_is_stored(tmp_path, monkeypatch, caplog):
-    put, done = reojax.sweep.__globals__["Store"].put, []
+    put, done = Store.put, []
 
     def put_two(self, chunk):
         if len(done) == 2:
@@ -195,11 +197,19 @@ def test_ctrl_c_keeps_what_is_stored(tmp_path, monkeypatch, caplog):
         done.append(chunk.number)
         put(self, chunk)
 
-    monkeypatch.setattr(reojax.sweep.__globals__["Store"], "put", put_two)
+    monkeypatch.setattr(Store, "put", put_two)
     with pytest.raises(KeyboardInterrupt):
         small(tmp_path / "s")
     assert "the same sweep goes on from there" in caplog.text
     assert len(list((tmp_path / "s").glob("chunk-*.npz"))) == 2
+
+
+def test_axes_of_another_sweep_in_a_store_are_noticed(tmp_path):
+    small(tmp_path / "s")
+    small(tmp_path / "t", axes={"x": AXES["x"], "y": np.array([1.0, 3.0])})
+    (tmp_path / "s" / "axes.npz").write_bytes((tmp_path / "t" / "axes.npz").read_bytes())
+    with pytest.raises(ValueError, match=r"axes.npz and sweep.json do not belong together"):
+        merge(tmp_path / "s")
 
 
 @pytest.mark.parametrize("damage", [b"", b"{}", b'{"identity": {"schema": "x"}, "units": {}}'])
@@ -212,3 +222,12 @@ def test_a_folder_that_is_no_store(tmp_path, damage):
     (tmp_path / "file").touch()
     with pytest.raises(ValueError, match="cannot use .* as a store"):
         small(tmp_path / "file")
+
+
+def test_what_a_killed_process_left_is_removed(tmp_path):
+    """Not what another one may be writing just now."""
+    for name, age in (("old", 1e4), ("new", 0)):
+        (tmp_path / f".reojax-{name}").touch()
+        os.utime(tmp_path / f".reojax-{name}", (time.time() - age,) * 2)
+    small(tmp_path)
+    assert [file.name for file in tmp_path.glob(".reojax-*")] == [".reojax-new"]

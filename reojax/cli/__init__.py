@@ -2,18 +2,25 @@
 
 A subcommand's module has a docstring, whose first line is its help, `add_arguments(parser)` and `run(args)`.
 It imports what computes inside `run`, so that help and mistyped arguments are answered at once. Results go
-to stdout, after any file has been written. Exit status: 0 done, 2 bad input (one line on stderr), 130
-interrupted.
+to stdout, after any file has been written. Exit status: 0 done, 1 done but something has no result, 2 bad
+input (one line on stderr), 130 interrupted.
 """
 
 import os
 import sys
 from collections.abc import Sequence
 
-from reojax.cli import simulate
+from reojax.cli import compare, export, merge, plan, simulate, sweep
 from reojax.cli._arguments import BadInput, Parser, joined, version
 
-COMMANDS = {"simulate": simulate}
+COMMANDS = {
+    "simulate": simulate,
+    "compare": compare,
+    "export": export,
+    "plan": plan,
+    "sweep": sweep,
+    "merge": merge,
+}
 """Subcommands by name."""
 
 

@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from PIL import Image
+from tqdm import tqdm
 
 from reojax._arrays import as_numbers
 from reojax._output import check_writable, replacing
@@ -90,6 +91,7 @@ def frames_figure(
     titles: Sequence[str] | None = None,
     columns: int | None = None,
     view: View | None = None,
+    frames: Frames | None = None,
 ) -> Figure:
     """Draw a robot at the corners of a path, and `per_edge - 1` times between two, as a row of 3-D frames.
 
@@ -101,11 +103,13 @@ def frames_figure(
         titles: a line above each frame; default where along the path, in edges.
         columns: frames in one row; default all.
         view: from where to look; default from the front, y up.
+        frames: the `frames_along` of the path with this `per_edge`, if they are known already.
 
     Raises:
         ValueError: if the path does not fit the robot, or numbers of frames and titles differ.
     """
-    frames = frames_along(robot, path, per_edge=per_edge)
+    if frames is None:
+        frames = frames_along(robot, path, per_edge=per_edge)
     count = len(frames.theta)
     if titles is None:
         titles = [f"edge {k / per_edge:g}" for k in range(count)] if count > 1 else [""]
@@ -114,7 +118,7 @@ def frames_figure(
     figure = Figure(figsize=(1.9 * columns, 1.9 * rows + 0.4), facecolor="white")
     top = 1 - 0.4 / (1.9 * rows + 0.4)
     axes = figure.subplots(rows, columns, squeeze=False, subplot_kw={"projection": "3d"}).ravel()
-    figure.subplots_adjust(left=0.0, right=1.0, bottom=0.0, top=top - 0.03 / rows, wspace=0.0, hspace=0.08)
+    figure.subplots_adjust(left=0.0, right=1.0, bottom=0.0, top=top - 0.03 / rows, wspace=0.0, hspace=0.12)
     for spare in axes[count:]:
         spare.set_axis_off()
     draw_frames(list(axes[:count]), robot, frames, titles=titles, view=view)
@@ -131,6 +135,7 @@ def animation(
     seconds: float = 4.0,
     titles: Sequence[str] | None = None,
     view: View | None = None,
+    progress: bool = False,
 ) -> None:
     """Write a GIF of a robot along a path at zero momentum, every edge equally long; whole or not at all.
 
@@ -142,6 +147,7 @@ def animation(
         seconds: how long the path takes. The last frame stays for a second, then it starts again.
         titles: a name for each edge.
         view: from where to look; default from the front, y up.
+        progress: whether to show progress on stderr.
 
     Raises:
         ValueError: if the file cannot be written, the path does not fit the robot, or a number is not positive.
@@ -158,7 +164,7 @@ def animation(
     names = None
     if titles is not None:
         names = [titles[min(k // per_edge, path.edges - 1)] for k in range(len(poses.theta))]
-    animate(robot, poses, target, seconds=seconds, titles=names, view=view)
+    animate(robot, poses, target, seconds=seconds, titles=names, view=view, progress=progress)
 
 
 def animate(
@@ -169,6 +175,7 @@ def animate(
     seconds: float = 4.0,
     titles: Sequence[str] | None = None,
     view: View | None = None,
+    progress: bool = False,
 ) -> None:
     """Write a GIF of a robot in given poses, equally spaced in time; whole or not at all.
 
@@ -179,6 +186,7 @@ def animate(
         seconds: from first to last pose. The last one stays for a second, then it starts again.
         titles: a line above each frame.
         view: from where to look; default from the front, y up.
+        progress: whether to show progress on stderr.
 
     Raises:
         ValueError: if the file cannot be written, a pose does not fit the robot, or a number is not positive.
@@ -192,7 +200,7 @@ def animate(
         raise ValueError(f"`titles` has {len(titles)} lines; there are {count} frames.")
     low, high = _extent(robot, frames)
     images = []
-    for k in range(count):
+    for k in tqdm(range(count), desc=target.name, unit=" frames", disable=not progress):
         figure = Figure(figsize=(3.6, 3.2), dpi=100, facecolor="white")
         canvas = FigureCanvasAgg(figure)
         axes = cast(Axes3D, figure.add_axes((0.0, 0.0, 1.0, 0.93), projection="3d"))
@@ -258,4 +266,4 @@ def _directions(axes: Axes3D, low: np.ndarray, high: np.ndarray) -> None:
     length = decade * max(step for step in (1, 2, 5) if step * decade <= 0.3 * half)
     draw_axes(axes, length, at=(low + high) / 2 + camera.T @ np.array([-0.8 * half, -0.85 * half, 0.0]))
     text = f"{1000 * length:g} mm" if length < 1 else f"{length:g} m"
-    axes.text2D(0.22, 0.02, f"x, y, z: {text}", transform=axes.transAxes, fontsize=7, color=INK)
+    axes.text2D(0.24, 0.07, f"x, y, z: {text}", transform=axes.transAxes, fontsize=7, color=INK)

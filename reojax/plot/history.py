@@ -1,6 +1,7 @@
 """Orientation and joint angles along a path."""
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -8,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reojax._arrays import Array
-from reojax._orientation import tilt_and_roll
+from reojax._orientation import LEVEL, tilt_and_roll, zxz_without_jumps
 from reojax.holonomy import rotation_history
 from reojax.path import Path
 from reojax.plot._style import INK, JOINTS, dress
@@ -21,6 +22,61 @@ _DASHES = ((None, None), (None, None), (5, 2.5), (1.5, 1.5))
 """By joint; two joints may move alike, and the one drawn last must not hide the other."""
 
 
+_EULER = (("first, about z", "#009e73"), ("second, about x", "#cc79a7"), ("third, about z", "#56b4e9"))
+
+
+def draw_orientation(
+    axes: Axes, rotations: Float[Array, "m 3 3"], *, edges: int, angles: Literal["tilt", "zxz"] = "tilt"
+) -> Axes:
+    """Draw the orientation of the base along a path, in degrees.
+
+    Args:
+        axes: flat axes; x counts the edges of the path.
+        rotations: (m, 3, 3) equally spaced along the path, first to last.
+        edges: number of edges of the path.
+        angles: "tilt" for tilt about x, tilt about y and roll about z, `R = exp((tilt_x, tilt_y, 0)) Rz(roll)`;
+            "zxz" for the ZXZ angles (a, b, c) of `R = Rz(a) Rx(b) Rz(c)`, counted on without jumps, and a + c.
+            Where b is below 0.1 rad the axes are shaded: only b and a + c mean anything there, and c is carried over.
+
+    Raises:
+        ValueError: if the shape of `rotations` is another, or `angles` is neither.
+    """
+    history = np.asarray(rotations, float)
+    if history.ndim != 3 or history.shape[1:] != (3, 3) or len(history) < 2:
+        raise ValueError(f"`rotations` has shape {history.shape}; it must be (m, 3, 3), two or more.")
+    if angles not in ("tilt", "zxz"):
+        raise ValueError(f"`angles` is {angles!r}; it must be 'tilt' or 'zxz'.")
+    along = np.linspace(0, edges, len(history))
+    told = tilt_and_roll(history) if angles == "tilt" else zxz_without_jumps(history)
+    for (label, colour), values in zip(_ANGLES if angles == "tilt" else _EULER, told.T, strict=True):
+        axes.plot(along, np.rad2deg(values), color=colour, label=label, linewidth=2)
+    if angles == "zxz":
+        total = np.rad2deg(told[:, 0] + told[:, 2])
+        axes.plot(along, total, color="#d55e00", label="first + third", linewidth=2, dashes=(5, 2))
+        near = np.abs(told[:, 1]) < LEVEL
+        axes.fill_between(along, 0, 1, where=near, transform=axes.get_xaxis_transform(), color="#eeeeee", zorder=0)
+    axes.set_ylabel("base orientation [deg]", color=INK)
+    dress(axes, edges)
+    return axes
+
+
+def draw_joints(axes: Axes, robot: Robot, path: Path) -> Axes:
+    """Draw the joint angles of a robot along a path, in degrees; x counts the path's edges.
+
+    Raises:
+        ValueError: if the path does not fit the robot.
+    """
+    if path.joints != robot.joints:
+        raise ValueError(f"`path` has {path.joints} joint angles; {robot.name!r} has {robot.joints} joints.")
+    corners = np.rad2deg(np.asarray(path.waypoints, float))
+    for k, label in enumerate(robot.joint_names):
+        dashes, colour = _DASHES[k % len(_DASHES)], JOINTS[k % len(JOINTS)]
+        axes.plot(corners[:, k], color=colour, label=label, linewidth=2, dashes=dashes)
+    axes.set_ylabel("joint angles [deg]", color=INK)
+    dress(axes, path.edges)
+    return axes
+
+
 def history_figure(
     robot: Robot,
     path: Path,
@@ -28,13 +84,14 @@ def history_figure(
     title: str | None = None,
     edge_names: Sequence[str] | None = None,
     rotations: Float[Array, "m 3 3"] | None = None,
+    angles: Literal["tilt", "zxz"] = "tilt",
 ) -> Figure:
     """Draw how the base turns along a path, and what the joints do.
 
     Above, tilt about x and y and roll about z of the base: `R = exp((tilt_x, tilt_y, 0)) Rz(roll)`. These are
     the ZXZ angles (a, b, c) told without jumps: the tilt has length b and direction a, and the roll is a + c,
-    counted on beyond a half turn. Below, the joint angles. Every edge of the path has the same width, as
-    there is no time in it.
+    counted on beyond a half turn. Or the ZXZ angles themselves, see `draw_orientation`. Below, the joint angles. Every
+    edge of the path has the same width, as there is no time in it.
 
     Args:
         robot: the robot.
@@ -42,6 +99,7 @@ def history_figure(
         title: first line of the title; default the robot's name.
         edge_names: a name for each edge.
         rotations: the `rotation_history` of the path, if it is known already.
+        angles: "tilt" or "zxz", as in `draw_orientation`.
 
     Raises:
         ValueError: if the path has no edge or does not fit the robot, or the names do not fit the path.
@@ -51,25 +109,15 @@ def history_figure(
     if edge_names is not None and len(edge_names) != path.edges:
         raise ValueError(f"`edge_names` has {len(edge_names)} names; the path has {path.edges} edges.")
     history = rotation_history(robot, path, samples=_SAMPLES) if rotations is None else rotations
-    angles = np.rad2deg(tilt_and_roll(history))
-    corners = np.rad2deg(np.asarray(path.waypoints, float))
     figure = Figure(figsize=(7.2, 6.4), layout="constrained", facecolor="white")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.15, 1))
-    along = np.linspace(0, path.edges, len(angles))
-    for (label, colour), values in zip(_ANGLES, angles.T, strict=True):
-        above.plot(along, values, color=colour, label=label, linewidth=2)
-    for k, label in enumerate(robot.joint_names):
-        dashes = _DASHES[k % len(_DASHES)]
-        colour = JOINTS[k % len(JOINTS)]
-        below.plot(corners[:, k], color=colour, label=label, linewidth=2, dashes=dashes)
-    above.set_ylabel("base orientation [deg]", color=INK)
-    below.set_ylabel("joint angles [deg]", color=INK)
-    for axes in (above, below):
-        dress(axes, path.edges)
+    draw_orientation(above, history, edges=path.edges, angles=angles)
+    draw_joints(below, robot, path)
     _name_edges(below, edge_names, path.edges)
     above.set_title(title or robot.name, loc="left", pad=48, fontsize=13, fontweight="bold", color=INK)
-    tilt = float(np.hypot(*angles[-1, :2]))
-    result = f"net rotation: rolls {_signed(angles[-1, 2])} about z, and the z axis tips by {tilt:.1f}°"
+    end = np.rad2deg(tilt_and_roll(history)[-1])
+    tilt = float(np.hypot(*end[:2]))
+    result = f"net rotation: rolls {_signed(end[2])} about z, and the z axis tips by {tilt:.1f}°"
     above.annotate(result, (0, 1), (0, 30), "axes fraction", "offset points", fontsize=10.5, color=INK)
     return figure
 

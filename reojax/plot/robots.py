@@ -1,12 +1,14 @@
 """Robots in space: their links at a pose, about their centre of mass."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
+from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from numpy.typing import ArrayLike
@@ -137,13 +139,20 @@ def posed_faces(robot: Robot, theta: ArrayLike, rotation: ArrayLike | None = Non
     if base.shape != (3, 3) or not np.isfinite(base).all() or np.abs(base @ base.T - np.eye(3)).max() > 1e-3:
         raise ValueError(f"`rotation` is {base.tolist()}; it must be a rotation matrix, (3, 3).")
     faces, colours = [], []
-    for link, own in enumerate(link_faces(robot)):
+    links, pins = _parts(robot)
+    for link, own in enumerate(links):
         faces.append(own @ turned[link].T + origin[link])
         colours += [BASE if not link else LINKS[(link - 1) % len(LINKS)]] * len(own)
-    for joint, own in enumerate(joint_faces(robot)):
+    for joint, own in enumerate(pins):
         faces.append(own @ turned[joint + 1].T + origin[joint + 1])
         colours += [INK] * len(own)
     return np.concatenate(faces) @ base.T, colours
+
+
+@lru_cache(maxsize=32)
+def _parts(robot: Robot) -> tuple[list[Faces], list[Faces]]:
+    """Faces of links and joints; kept, as frames and animations draw one robot many times."""
+    return link_faces(robot), joint_faces(robot)
 
 
 def poses(robot: Robot, theta: np.ndarray) -> tuple[Float[np.ndarray, "n 3 3"], Float[np.ndarray, "n 3"]]:
@@ -174,7 +183,11 @@ def _show(axes: Axes3D, points: np.ndarray) -> None:
     middle, half = (low + high) / 2, max(high - low) / 2
     for limit, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle, strict=True):
         limit(centre - half, centre + half)
-    axes.set_box_aspect((1, 1, 1), zoom=1.3)  # pyright: ignore[reportArgumentType]  (zoom is a float)
+    for axis, name in zip((axes.xaxis, axes.yaxis, axes.zaxis), "xyz", strict=True):
+        axis.set_label_text(f"{name} [m]", color=INK)
+        axis.set_major_locator(MaxNLocator(4))
+    axes.tick_params(labelsize=8)
+    axes.set_box_aspect((1, 1, 1), zoom=1.1)  # pyright: ignore[reportArgumentType]  (zoom is a float)
 
 
 def _vector(entry: str, value: Any, length: int) -> np.ndarray:

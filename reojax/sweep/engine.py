@@ -12,7 +12,7 @@ from jax.sharding import Mesh
 from reojax.sweep.chunks import Chunk, Program, compiled
 from reojax.sweep.outputs import Outputs, bad_rows, blank
 
-IN_FLIGHT = 2
+IN_FLIGHT = 1
 """Calls under way while the results of an earlier one are put away."""
 
 
@@ -20,21 +20,21 @@ def run(function: Callable[..., Any], program: Program, outputs: Outputs, todo: 
     """Run the chunks `todo`, which is read one round of devices at a time; yield those this process computes."""
     fallback = _Fallback(function, program, outputs)
     numbers, under_way = iter(todo), deque[tuple[Any, list[int | None]]]()
-    with jax.debug_nans(False):  # a sweep reports them itself
-        while True:
-            chunks: list[int | None] = list(islice(numbers, program.mesh.size))
-            if chunks:
-                chunks += [None] * (program.mesh.size - len(chunks))
-                under_way.append((_started(program, chunks), chunks))
-            if under_way and (not chunks or len(under_way) > IN_FLIGHT):
-                yield from _finished(program, fallback, outputs, *under_way.popleft())
-            elif not chunks:
-                return
+    while True:
+        chunks: list[int | None] = list(islice(numbers, program.mesh.size))
+        if chunks:
+            chunks += [None] * (program.mesh.size - len(chunks))
+            under_way.append((_started(program, chunks), chunks))
+        if under_way and (not chunks or len(under_way) > IN_FLIGHT):
+            yield from _finished(program, fallback, outputs, *under_way.popleft())
+        elif not chunks:
+            return
 
 
 def _started(program: Program, chunks: list[int | None]) -> Any:
     try:
-        return program.start(chunks)
+        with jax.debug_nans(False):  # a sweep tells of them itself
+            return program.start(chunks)
     except Exception:  # of the program, which is compiled already; other calls fail when their results are read
         return None
 
@@ -67,17 +67,19 @@ class _Fallback:
             mesh = Mesh(self.program.mesh.local_mesh.devices.ravel()[:1], self.program.mesh.axis_names)
             self.alone = compiled(self.function, self.program.designs, self.program.cut, mesh)
         try:
-            started = self.alone.start([number])
-            return self.alone.results(started, number, self.alone.mesh.devices.flat[0]), {}
+            with jax.debug_nans(False):
+                started = self.alone.start([number])
+                return self.alone.results(started, number, self.alone.mesh.devices.flat[0]), {}
         except Exception as error:
             if "RESOURCE_EXHAUSTED" in str(error):
-                raise MemoryError("a chunk does not fit into memory; choose a smaller `chunk_size`.") from error
+                raise ValueError("a chunk does not fit into memory; choose a smaller `chunk_size`.") from error
         start, stop = self.program.cut.bounds(number)
         results, failed = blank(self.outputs, stop - start), {}
         columns = self.program.designs.stretch(start, stop)
         for row in range(stop - start):
             try:
-                values = self.one({name: column[row] for name, column in columns.items()})
+                with jax.debug_nans(False):
+                    values = self.one({name: column[row] for name, column in columns.items()})
                 for result, value in zip(results, values, strict=True):
                     result[row] = value
             except Exception as error:

@@ -35,10 +35,7 @@ def identity(
         "reojax": _version(),
         "jax": jax.__version__,
         "platform": platform,
-        "axes": {
-            name: {"values": len(values), "dtype": str(values.dtype), "sha256": _sha256(values.tobytes())}
-            for name, values in designs.axes.items()
-        },
+        "axes": {name: axis_identity(values) for name, values in designs.axes.items()},
         "order": list(designs.axes),
         "zipped": designs.zipped,
         "function": _sha256(program.as_text().encode()),
@@ -51,9 +48,14 @@ def identity(
     }
 
 
+def axis_identity(values: np.ndarray) -> dict[str, Any]:
+    """Return what tells the values of an axis from others, as plain data."""
+    return {"values": len(values), "dtype": str(values.dtype), "sha256": _sha256(values.tobytes())}
+
+
 def digest(same: Mapping[str, Any]) -> str:
-    """Return one hash of an identity; every chunk carries it."""
-    return _sha256(json.dumps(same, sort_keys=True).encode())
+    """Return one hash of an identity; every chunk carries it. Robots are in the function, whatever their names."""
+    return _sha256(json.dumps({**same, "robots": None}, sort_keys=True).encode())
 
 
 def differences(stored: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
@@ -68,6 +70,7 @@ def differences(stored: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
             ("order", "axes"),
             ("zipped", "zipped"),
             ("chunk", "chunk size"),
+            ("block", "block size"),
         )
         if stored.get(key) != now[key]
     ]

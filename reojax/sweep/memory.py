@@ -19,13 +19,7 @@ class Memory:
         Raises:
             ValueError: if there is not enough memory; its text ends in `advice`.
         """
-        needed = sizes.total * bytes_per_design(outputs)
-        free = available()
-        if free is not None and needed > free:
-            raise ValueError(
-                f"the results of {sizes.total:.3g} designs take {needed / 2**30:.3g} GiB of memory, and "
-                f"{free / 2**30:.3g} GiB are free; {advice}."
-            )
+        check_memory(sizes.total, bytes_per_design(outputs), advice)
         self._arrays = [np.empty((sizes.total, *output.shape), output.dtype) for output in outputs]
         self._sizes = sizes
         self.failures: dict[int, str] = {}
@@ -41,6 +35,20 @@ class Memory:
     def arrays(self, designs: Designs) -> list[Any]:
         """Return the results with the grid's shape in front."""
         return [array.reshape(designs.shape + array.shape[1:]) for array in self._arrays]
+
+
+def check_memory(designs: int, bytes_each: int, advice: str) -> None:
+    """Refuse results that do not fit into memory.
+
+    Raises:
+        ValueError: naming the sizes; its text ends in `advice`.
+    """
+    needed, free = designs * bytes_each, available()
+    if free is not None and needed > free:
+        raise ValueError(
+            f"the results of {designs:.3g} designs take {needed / 2**30:.3g} GiB of memory, and "
+            f"{free / 2**30:.3g} GiB are free; {advice}."
+        )
 
 
 def available() -> int | None:

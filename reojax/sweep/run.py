@@ -2,18 +2,15 @@
 
 import logging
 import os
-import random
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import prod
 from typing import Any
 
 import jax
 import numpy as np
-from jax.sharding import Mesh
 from numpy.typing import ArrayLike
-from tqdm import tqdm
 
-from reojax.sweep.chunks import Cut, compiled, cut
+from reojax.sweep.chunks import compiled, cut
 from reojax.sweep.devices import Devices, mesh_of
 from reojax.sweep.engine import run
 from reojax.sweep.grid import Designs, check_axes, check_function
@@ -21,7 +18,9 @@ from reojax.sweep.identity import identity
 from reojax.sweep.memory import Memory
 from reojax.sweep.merge import assembled
 from reojax.sweep.outputs import Outputs, bytes_per_design, outputs_of
-from reojax.sweep.store import Store, create
+from reojax.sweep.progress import Progress
+from reojax.sweep.resume import complete
+from reojax.sweep.store import create
 from reojax.sweep.table import Sweep
 
 log = logging.getLogger("reojax")
@@ -70,6 +69,25 @@ def sweep(
         ValueError: naming what is wrong with the arguments, or how the store's sweep differs. A design that
             fails raises nothing: it is logged, its results are NaN, and `Sweep.bad` has it.
     """
+    found = computed(function, axes, chunk_size, store, devices, progress, units, shard)
+    if bad := found.bad:
+        lines = [f"{len(bad)} of {prod(found.shape)} designs gave no finite result:"]
+        lines += [f"  {design}" for design in bad[:_TOLD]]
+        log.warning("\n".join(lines + ["  ..."] * (len(bad) > _TOLD)))
+    return found
+
+
+def computed(
+    function: Callable[..., Any],
+    axes: Mapping[str, ArrayLike],
+    chunk_size: int | None,
+    store: str | os.PathLike[str] | None,
+    devices: Devices,
+    progress: bool,
+    units: Mapping[str, str] | None,
+    shard: tuple[int, int] | None,
+) -> Sweep:
+    """Do what `sweep` does, and leave the telling of bad designs to the caller."""
     designs = check_axes(axes)
     check_function(function, designs)
     mesh = mesh_of(devices)
@@ -84,114 +102,31 @@ def sweep(
     if store is None:
         memory = Memory(outputs.arrays, sizes, "give a `store`")
         program = compiled(function, designs, sizes, mesh)
-        with _Progress(sizes, mine, progress) as shown:
-            for chunk in run(function, program, outputs, mine):
-                memory.put(chunk)
-                shown.add(chunk.number)
+        try:
+            with Progress(sizes, mine, show=progress) as shown:
+                for chunk in run(function, program, outputs, mine):
+                    memory.put(chunk)
+                    shown.add(chunk.number)
+        except KeyboardInterrupt:
+            log.warning("stopped; without a `store` nothing is kept")
+            raise
         failures, load = memory.failures, lambda: memory.arrays(designs)
     else:
         kept = create(store, identity(function, designs, outputs, sizes, platform), designs, labels)
-        failures = _into_store(function, outputs, kept, mesh, mine, progress)
+        failures = complete(function, outputs, kept, mesh, mine, progress)
         load = lambda: assembled([kept])[0]
-    result = Sweep(designs, labels, lambda: jax.tree.unflatten(outputs.structure, load()), failures)
-    _report(result)
-    return result
-
-
-def _into_store(
-    function: Callable[..., Any], outputs: Outputs, store: Store, mesh: Mesh, mine: range, progress: bool
-) -> dict[int, str]:
-    """Compute the chunks `mine` that the store does not have; return the bad designs of all of `mine`."""
-    failures = {}
-    missing = []
-    for number in mine:
-        chunk = store.get(number)
-        if chunk is None:
-            store.file(number).unlink(missing_ok=True)
-            missing.append(number)
-        else:
-            failures[number] = chunk.bad
-    several = jax.process_count() > 1
-    if several:
-        missing = _agreed(missing, mine)
-    else:
-        random.Random(os.urandom(8)).shuffle(missing)
-    with _Progress(store.sizes, mine, progress and jax.process_index() == 0) as shown:
-        shown.begin(number for number in mine if number in failures)
-
-        def todo() -> Iterator[int]:
-            for number in missing:
-                if several or not store.file(number).exists():
-                    yield number
-                else:  # another process has finished it
-                    shown.add(number)
-
-        try:
-            if missing:
-                for chunk in run(function, compiled(function, store.designs, store.sizes, mesh), outputs, todo()):
-                    store.put(chunk)
-                    failures[chunk.number] = chunk.bad
-                    shown.add(chunk.number)
-        except KeyboardInterrupt:
-            log.warning(
-                f"stopped; finished chunks are in {str(store.folder)!r}, and the same sweep goes on from there."
-            )
-            raise
-    if several:
-        from jax.experimental import multihost_utils
-
-        multihost_utils.sync_global_devices("reojax.sweep: all chunks are stored")
-    for number in mine:
-        if number not in failures and (chunk := store.get(number)) is not None:
-            failures[number] = chunk.bad
-    return {design: reason for bad in failures.values() for design, reason in bad.items()}
-
-
-def _agreed(missing: Sequence[int], mine: range) -> list[int]:
-    """Chunks that are missing as the first process sees it, the same list in every process."""
-    from jax.experimental import multihost_utils
-
-    mask = multihost_utils.broadcast_one_to_all(np.isin(mine, missing))
-    return [number for number, absent in zip(mine, mask, strict=True) if absent]
-
-
-class _Progress:
-    """Progress on stderr, in designs."""
-
-    def __init__(self, sizes: Cut, mine: range, show: bool) -> None:
-        self._sizes = sizes
-        total = sum(map(self._designs, mine))
-        self._bar = tqdm(total=total, unit=" designs", unit_scale=True, disable=not show, mininterval=0.5)
-
-    def _designs(self, chunk: int) -> int:
-        start, stop = self._sizes.bounds(chunk)
-        return stop - start
-
-    def begin(self, chunks: Iterable[int]) -> None:
-        """Count chunks that were there before."""
-        self._bar.initial = sum(map(self._designs, chunks))
-        self._bar.n = self._bar.initial
-        self._bar.refresh()
-
-    def add(self, chunk: int) -> None:
-        self._bar.update(self._designs(chunk))
-
-    def __enter__(self) -> "_Progress":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()
+    return Sweep(designs, labels, lambda: jax.tree.unflatten(outputs.structure, load()), failures)
 
 
 def _checked_shard(shard: tuple[int, int] | None, store: object) -> tuple[int, int]:
     if shard is None:
         return 0, 1
-    first, parts = shard
-    if not 0 <= first < parts:
+    pair = shard if isinstance(shard, Sequence) and len(shard) == 2 else (0, 0)
+    if not all(isinstance(number, int | np.integer) for number in pair) or not 0 <= pair[0] < pair[1]:
         raise ValueError(f"`shard` is {shard!r}; it must be (i, n) with 0 <= i < n.")
     if store is None:
         raise ValueError("a shard's results go into a `store`; give the folder.")
-    return first, parts
+    return pair
 
 
 def _checked_units(units: Mapping[str, str] | None, designs: Designs, outputs: Outputs) -> dict[str, str]:
@@ -202,12 +137,3 @@ def _checked_units(units: Mapping[str, str] | None, designs: Designs, outputs: O
             names = ", ".join(known)
             raise ValueError(f"units[{name!r}] is {unit!r}; it must be the text of a unit, of one of {names}.")
     return labels
-
-
-def _report(result: Sweep) -> None:
-    """Say which designs are bad."""
-    if not (bad := result.bad):
-        return
-    lines = [f"{len(bad)} of {prod(result.shape)} designs gave no finite result:"]
-    lines += [f"  {design}" for design in bad[:_TOLD]]
-    log.warning("\n".join(lines + ["  ..."] * (len(bad) > _TOLD)))

@@ -79,6 +79,10 @@ class Sweep:
             for number in sorted(self._failures)
         ]
 
+    def design(self, number: int) -> dict[str, float]:
+        """Values of one design, by its number through the flattened grid."""
+        return self._designs.design(number)
+
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the results as a flat dict: `turn.angle` is the field `angle` of the entry `turn`."""
         leaves, _ = jax.tree_util.tree_flatten_with_path(self.results)
@@ -140,7 +144,7 @@ class Sweep:
             ValueError: if the file cannot be read, or is not a saved sweep.
         """
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
                 about = json.loads(str(file["about"]))
                 if about["schema"] != SCHEMA:
                     raise ValueError(f"its layout is {about['schema']!r}; this reojax reads {SCHEMA!r}")

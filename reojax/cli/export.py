@@ -1,0 +1,96 @@
+"""Write the joint trajectory of a manoeuvre as CSV or as a ROS 2 JointTrajectory (YAML)."""
+
+import argparse
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+from reojax.cli._arguments import BadInput, version
+from reojax.cli._planned import add_plan, planned
+
+if TYPE_CHECKING:
+    from reojax.robot import Robot
+
+LARGEST = 1_000_000
+"""Largest number of points in a file."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `reojax export`."""
+    add = parser.add_argument
+    add("file", metavar="FILE", help="to write: .csv, or .yaml, .yml or .json for ROS 2")
+    add("--robot", default="prototype", metavar="NAME", help="robot; a wrong name lists them [%(default)s]")
+    add_plan(parser, manoeuvre="a")
+    add("--rate", type=_positive, default=200.0, metavar="HZ", help="points per second, about [%(default)g]")
+    add("--delay", type=_delay, default=0.0, metavar="S", help="time before the first point [%(default)g]")
+    add("--torques", action="store_true", help="write the joint torques in free fall too")
+    add("--json", action="store_true", help="print one JSON object")
+
+
+def run(args: argparse.Namespace) -> None:
+    """Compute, write, and print what was written."""
+    from reojax import _session, robots
+    from reojax.export import check_trajectory
+
+    _session.start()
+    try:
+        check_trajectory(args.file)
+        report = _write(robots.by_name(args.robot), args)
+    except ValueError as error:
+        raise BadInput(f"reojax export: {error}") from error
+    text = f"{report['points']} points in {report['duration_s']:.6g} s, written to {args.file}"
+    print(json.dumps(report, indent=2, allow_nan=False) if args.json else text)
+
+
+def _write(robot: "Robot", args: argparse.Namespace) -> dict[str, Any]:
+    import jax
+    import numpy as np
+
+    from reojax.dynamics import inverse_dynamics
+    from reojax.export import write_trajectory
+
+    trajectory = planned(robot, args)
+    duration = float(trajectory.duration)
+    steps = math.ceil(duration * args.rate - 1e-9)
+    if steps >= LARGEST:
+        raise ValueError(f"{duration:g} s at {args.rate:g} Hz are {steps} points; at most {LARGEST} are written.")
+    time = np.linspace(0, duration, max(steps, 1) + 1)
+    state = jax.vmap(trajectory.at)(time)
+    effort = None
+    if args.torques:
+        effort = jax.jit(jax.vmap(inverse_dynamics, (None, 0, 0, 0)))(robot, *state)
+    write_trajectory(args.file, robot, time, *state, effort, delay=args.delay)
+    return {
+        "command": "export",
+        "version": version(),
+        "config": {
+            "robot": args.robot,
+            "manoeuvre": args.manoeuvre,
+            "twist_deg": args.twist,
+            "bend_deg": args.bend,
+            "law": args.law,
+            "rate_hz": args.rate,
+            "delay_s": args.delay,
+        },
+        "points": len(time),
+        "duration_s": duration,
+        "joints": list(robot.joint_names),
+        "file": args.file,
+    }
+
+
+def _positive(text: str) -> float:
+    number = _delay(text)
+    if not number:
+        raise argparse.ArgumentTypeError(f"{text!r} must be positive")
+    return number
+
+
+def _delay(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not (math.isfinite(number) and number >= 0):
+        raise argparse.ArgumentTypeError(f"{text!r} must be finite and not negative")
+    return number

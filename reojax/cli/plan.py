@@ -1,0 +1,218 @@
+"""Find manoeuvres that end on a target orientation; exit status 1 if it is not reached."""
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from reojax.cli._arguments import BadInput, degrees, version
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from reojax.plan import Plan
+    from reojax.robot import Robot
+
+_KINDS = {"rotvec": 3, "zxz": 3, "quat": 4}
+_TOLD = 24
+"""Most manoeuvres that are printed one by one; JSON and CSV have all of them."""
+_FRAMES = 120
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `reojax plan`."""
+    add = parser.add_argument
+    forms = "'rotvec X Y Z' or 'zxz A B C' in degrees, 'quat W X Y Z', or 'matrix FILE' with three rows of three"
+    add("--target", required=True, metavar="TARGET", help=f"rotation of the base: {forms}")
+    add("--robot", default="prototype", metavar="NAME", help="robot; a wrong name lists them [%(default)s]")
+    add("--twist-limit", type=degrees, default=270.0, metavar="DEG", help="of the distal joints [%(default)g]")
+    add("--bend-limit", type=degrees, default=120.0, metavar="DEG", help="of the centre joint [%(default)g]")
+    add("--max-manoeuvres", type=int, default=5, metavar="N", help="manoeuvres allowed [%(default)d]")
+    parts = "count: fewest manoeuvres; travel: least joint travel [%(default)s]"
+    add("--objective", choices=("count", "travel"), default="count", help=parts)
+    words = "manoeuvres: A and B; rectangles: each distal joint its own amplitude [%(default)s]"
+    add("--vocabulary", choices=("manoeuvres", "rectangles"), default="manoeuvres", help=words)
+    add("--json", action="store_true", help="print one JSON object, with all digits")
+    add("--out", metavar="FIGURE", help="draw the orientation on its way to a .png, .pdf or .svg")
+    add("--animate", metavar="GIF", help="draw the robot on its way to a .gif")
+    add("--csv", metavar="FILE", help="write the corners of the joint path, in degrees, to a .csv")
+
+
+def run(args: argparse.Namespace) -> None:
+    """Compute, write the files, and print."""
+    from reojax import _session, robots
+
+    _session.start()
+    try:
+        robot = robots.by_name(args.robot)
+        target = read_target(args.target)
+        _check_files(args)
+        plan = _plan(robot, target, args)
+        _write_files(robot, plan, target, args)
+    except ValueError as error:
+        raise BadInput(f"reojax plan: {error}") from error
+    report = _report(plan, target, args)
+    print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(report))
+    if not plan.converged:
+        raise SystemExit(1)
+
+
+def read_target(text: str) -> "np.ndarray":
+    """Rotation (3, 3) of a target as it is written at the command line.
+
+    Raises:
+        ValueError: saying what is wrong with it.
+    """
+    import numpy as np
+
+    from reojax import so3
+    from reojax.plan import checks
+
+    kind, *rest = text.split(None, 1)[:2] or [""]
+    words = rest[0] if rest else ""
+    if kind == "matrix":
+        return checks.rotations("target", _read_matrix(words.strip()), (3, 3))
+    if kind not in _KINDS:
+        names = ", ".join(map(repr, (*_KINDS, "matrix")))
+        raise ValueError(f"the target {text!r} must begin with one of {names}.")
+    try:
+        numbers = np.array([float(word) for word in words.replace(",", " ").split()])
+    except ValueError:
+        raise ValueError(f"the target {text!r} has something that is not a number.") from None
+    if numbers.size != _KINDS[kind] or not np.isfinite(numbers).all():
+        raise ValueError(f"the target {text!r} has {numbers.size} numbers; {kind} takes {_KINDS[kind]} finite ones.")
+    if kind == "quat":
+        length = float(np.linalg.norm(numbers))
+        if abs(length - 1) > 1e-3:
+            raise ValueError(f"the target {text!r} is no rotation: its length is {length:.6g}, not 1.")
+        return np.asarray(so3.from_quaternion(numbers))
+    return np.asarray({"rotvec": so3.exp, "zxz": so3.from_euler_zxz}[kind](np.deg2rad(numbers)))
+
+
+def _read_matrix(name: str) -> "np.ndarray":
+    import numpy as np
+
+    try:
+        text = Path(name).read_text()
+    except OSError as error:
+        raise ValueError(f"cannot read the target file {name!r}: {error.strerror or error}.") from error
+    except UnicodeDecodeError:
+        raise ValueError(f"cannot read the target file {name!r}: it is not text.") from None
+    try:
+        numbers = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        raise ValueError(f"the target file {name!r} has something that is not a number.") from None
+    if len(numbers) != 9:
+        raise ValueError(f"the target file {name!r} has {len(numbers)} numbers; a rotation matrix has nine.")
+    return np.array(numbers).reshape(3, 3)
+
+
+def _check_files(args: argparse.Namespace) -> None:
+    from reojax._output import check_writable
+
+    if args.out is not None or args.animate is not None:
+        from reojax import plot
+
+        if args.out is not None:
+            plot.check_picture(args.out)
+        if args.animate is not None:
+            plot.check_animation(args.animate)
+    if args.csv is not None:
+        if not args.csv.endswith(".csv"):
+            raise ValueError(f"cannot write {args.csv!r}: the name of a table ends in .csv.")
+        check_writable(args.csv)
+
+
+def _plan(robot: "Robot", target: "np.ndarray", args: argparse.Namespace) -> "Plan":
+    import numpy as np
+
+    from reojax.plan import plan
+
+    return plan(
+        robot,
+        target,
+        twist_limit=float(np.deg2rad(args.twist_limit)),
+        bend_limit=float(np.deg2rad(args.bend_limit)),
+        max_manoeuvres=args.max_manoeuvres,
+        objective=args.objective,
+        vocabulary=args.vocabulary,
+    )
+
+
+def _write_files(robot: "Robot", plan: "Plan", target: "np.ndarray", args: argparse.Namespace) -> None:
+    import numpy as np
+
+    from reojax._output import replacing
+
+    if args.csv is not None:
+        rows = [",".join(f"{name} [deg]" for name in robot.joint_names)]
+        rows += [",".join(f"{angle:.12g}" for angle in corner) for corner in np.rad2deg(plan.waypoints)]
+        with replacing(args.csv) as file:
+            file.write(("\n".join(rows) + "\n").encode())
+    if not len(plan.word):  # nothing moves, so there is nothing to draw
+        return
+    if args.out is not None:
+        from reojax import plot
+
+        plot.save(plot.plan_figure(robot, plan, target), args.out)
+    if args.animate is not None:
+        from reojax import plot
+        from reojax.path import polygon
+
+        path = polygon(plan.waypoints)
+        plot.animation(robot, path, args.animate, frames=_FRAMES, seconds=0.4 * min(path.edges, 60))
+
+
+def _report(plan: "Plan", target: "np.ndarray", args: argparse.Namespace) -> dict[str, Any]:
+    import numpy as np
+
+    drawn = len(plan.word) > 0
+    parts = zip(plan.word, np.rad2deg(plan.twist), np.rad2deg(plan.bend), np.rad2deg(plan.last_twist), strict=True)
+    return {
+        "command": "plan",
+        "version": version(),
+        "config": {
+            "robot": args.robot,
+            "target": args.target,
+            "twist_limit_deg": args.twist_limit,
+            "bend_limit_deg": args.bend_limit,
+            "max_manoeuvres": args.max_manoeuvres,
+            "objective": args.objective,
+            "vocabulary": args.vocabulary,
+        },
+        "target_matrix": target.tolist(),
+        "manoeuvres": [
+            {"name": name, "twist_deg": float(t), "bend_deg": float(b), "last_twist_deg": float(last)}
+            for name, t, b, last in parts
+        ],
+        "waypoints_rad": plan.waypoints.tolist(),
+        "rotation_matrix": plan.rotation.tolist(),
+        "error_rad": float(plan.error),
+        "error_deg": float(np.rad2deg(plan.error)),
+        "travel_deg": float(np.rad2deg(plan.travel)),
+        "converged": bool(plan.converged),
+        "picture": args.out if drawn else None,
+        "animation": args.animate if drawn else None,
+        "csv": args.csv,
+    }
+
+
+def _text(report: dict[str, Any]) -> str:
+    config, loops = report["config"], report["manoeuvres"]
+    lines = [f"Plan for {config['target']} on {config['robot']}: {len(loops)} manoeuvres", ""]
+    if loops:
+        lines.append(f"{'':>6}  {'twist [deg]':>12}{'bend [deg]':>12}{'last twist [deg]':>18}")
+    for loop in loops[:_TOLD]:
+        cells = (loop["twist_deg"], loop["bend_deg"], loop["last_twist_deg"])
+        first, second, third = (round(cell, 6) + 0.0 for cell in cells)
+        lines.append(f"{loop['name']:>6}  {first:12.6f}{second:12.6f}{third:18.6f}")
+    if len(loops) > _TOLD:
+        lines.append(f"{'...':>6}  and {len(loops) - _TOLD} more; --json and --csv have them")
+    lines += ["" if loops else "nothing to do", f"joint travel {report['travel_deg']:.1f} deg"]
+    error = f"{report['error_rad']:.1e} rad"
+    if report["converged"]:
+        lines.append(f"reached, to {error}")
+    else:
+        lines.append(f"NOT reached: {report['error_deg']:.4f} deg ({error}) are left; this is the closest plan")
+    lines += [f"{what} in {report[what]}" for what in ("picture", "animation", "csv") if report[what] is not None]
+    return "\n".join(lines)

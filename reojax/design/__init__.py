@@ -1,0 +1,31 @@
+"""Design by gradients: pose a problem over a robot and its loop, solve it, and say how certain the answer is."""
+
+from reojax.design.certainty import (
+    Sensitivities as Sensitivities,
+    Spread as Spread,
+    scatter as scatter,
+    sensitivities as sensitivities,
+    spread as spread,
+)
+from reojax.design.descent import descend as descend
+from reojax.design.edits import (
+    with_com_offset as with_com_offset,
+    with_joint_inertia as with_joint_inertia,
+    with_length as with_length,
+    with_mass as with_mass,
+)
+from reojax.design.loops import Loops as Loops, polygons as polygons, rectangles as rectangles
+from reojax.design.measures import (
+    bend_within as bend_within,
+    loop_area as loop_area,
+    off_axis_within as off_axis_within,
+    travel as travel,
+    turned_about as turned_about,
+    turned_to as turned_to,
+    value_of as value_of,
+    weighted as weighted,
+)
+from reojax.design.problem import Outcome as Outcome, Problem as Problem
+from reojax.design.smooth import fourier_loops as fourier_loops, spline_loops as spline_loops
+from reojax.design.solver import Solution as Solution, optimise as optimise
+from reojax.design.variables import Space as Space, Variable as Variable

@@ -1,0 +1,138 @@
+"""Quantities of a design that are wanted small, or must hold: each makes a function of an `Outcome`."""
+
+from collections.abc import Mapping
+
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike
+
+from reojax import so3
+from reojax._arrays import Array
+from reojax._robot_checks import numbers
+from reojax.design.loops import Loops
+from reojax.design.problem import Measure, Outcome
+from reojax.path import joint_travel
+
+
+def turned_to(target: ArrayLike | str) -> Measure:
+    """Rotation vector (3,) from the target to the net rotation [rad], for an equality: all three components.
+
+    Smooth near the target, half turns included: it is taken relative to the target.
+
+    Args:
+        target: (3, 3) rotation; or the name of a variable (3,) that is its rotation vector, to be held: then one
+            compiled problem serves all targets.
+
+    Raises:
+        ValueError: if it is not a rotation.
+    """
+    if isinstance(target, str):
+        name = target
+        return lambda outcome: so3.log(so3.exp(outcome.values[name]).T @ outcome.rotation)
+    matrix = numbers("target", target, (3, 3))
+    if np.abs(matrix.T @ matrix - np.eye(3)).max() > 1e-6 or np.linalg.det(matrix) < 0:
+        raise ValueError(f"`target` is {matrix.tolist()}; it must be a rotation matrix.")
+
+    def measure(outcome: Outcome) -> Array:
+        return so3.log(jnp.asarray(matrix.T, outcome.rotation.dtype) @ outcome.rotation)
+
+    return measure
+
+
+def turned_about(axis: ArrayLike, angle: float) -> Measure:
+    """Turn about `axis` less `angle` [rad], for an equality: the twist of the net rotation about that axis alone.
+
+    Args:
+        axis: (3,) in the base frame, not zero.
+        angle: wanted turn, right-handed [rad].
+
+    Raises:
+        ValueError: if the axis is no direction.
+    """
+    unit = _unit(axis)
+    half = np.array([np.cos(angle / 2), *(-np.sin(angle / 2) * unit)])
+
+    def measure(outcome: Outcome) -> Array:
+        q = so3.to_quaternion(outcome.rotation)
+        along = jnp.asarray(unit, q.dtype) @ q[1:]
+        # the twist's quaternion (w, along) less half the angle, on the side that is near
+        cosine, sine = q[0] * np.cos(angle / 2) + along * np.sin(angle / 2), along * half[0] - q[0] * np.sin(angle / 2)
+        side = jnp.where(cosine < 0, -1.0, 1.0)
+        return 2 * jnp.arctan2(side * sine, side * cosine)
+
+    return measure
+
+
+def off_axis_within(axis: ArrayLike, angle: float) -> Measure:
+    """Whether the net rotation tips `axis` by less than `angle`, for an inequality: squared half sines, ratio less 1.
+
+    Args:
+        axis: (3,) in the base frame, not zero.
+        angle: largest tilt of the axis, above 0 [rad].
+
+    Raises:
+        ValueError: if the axis is no direction, or the angle is not between 0 and pi.
+    """
+    unit = _unit(axis)
+    if not 0 < angle < np.pi:
+        raise ValueError(f"`angle` is {angle!r}; it must be between 0 and pi.")
+
+    def measure(outcome: Outcome) -> Array:
+        vector = so3.to_quaternion(outcome.rotation)[1:]
+        across = vector - (vector @ jnp.asarray(unit, vector.dtype)) * jnp.asarray(unit, vector.dtype)
+        return (across @ across) / np.sin(angle / 2) ** 2 - 1
+
+    return measure
+
+
+def travel(loop: Loops | None = None) -> Measure:
+    """Joint travel [rad]: of a family of loops, smooth in its coefficients; or of any path, with kinks at rest."""
+    if loop is None:
+        return lambda outcome: joint_travel(outcome.path)
+    return lambda outcome: loop.travel(outcome.values[loop.variable.name])
+
+
+def loop_area(outcome: Outcome) -> Array:
+    """Area of the loop in shape space [rad^2]: size of the vector of its projections onto the planes of two joints.
+
+    With two joints it is the enclosed area, with sign left out.
+    """
+    points = jnp.asarray(outcome.path.waypoints)
+    middle, step = 0.5 * (points[1:] + points[:-1]), points[1:] - points[:-1]
+    moment = middle.T @ step
+    tiny = jnp.finfo(points.dtype).tiny
+    return jnp.sqrt(0.125 * ((moment - moment.T) ** 2).sum() + tiny)
+
+
+def bend_within(joint: int, name: str) -> Measure:
+    """Whether the joint's angle stays within plus and minus the variable `name` [rad], for an inequality.
+
+    Least peak bend is smooth this way: let `name` be a variable, and make it the objective.
+    """
+
+    def measure(outcome: Outcome) -> Array:
+        angle, most = jnp.asarray(outcome.path.waypoints)[:, joint], outcome.values[name]
+        return jnp.concatenate([angle - most, -angle - most])
+
+    return measure
+
+
+def value_of(name: str) -> Measure:
+    """The variable `name` itself, in SI."""
+    return lambda outcome: outcome.values[name]
+
+
+def weighted(parts: Mapping[Measure, float]) -> Measure:
+    """Sum of measures, each times its weight."""
+
+    def measure(outcome: Outcome) -> Array:
+        return sum((weight * part(outcome) for part, weight in parts.items()), start=jnp.zeros(()))
+
+    return measure
+
+
+def _unit(axis: ArrayLike) -> np.ndarray:
+    vector = numbers("axis", axis, (3,))
+    if not vector.any():
+        raise ValueError("`axis` is zero; it must be a direction.")
+    return vector / np.sqrt(vector @ vector)

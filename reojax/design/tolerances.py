@@ -1,0 +1,102 @@
+"""Errors of a robot's numbers: where they come from, and the robot that has them."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from reojax._arrays import Array
+from reojax._robot_checks import numbers
+from reojax.robot import Robot
+
+RELATIVE = ("mass", "inertia", "rotor_inertia", "gear_ratio")
+"""Fields whose tolerances are relative, one error for every link or joint."""
+ABSOLUTE = ("com", "anchor", "axis")
+"""Fields whose tolerances are in m (com, anchor: three components each) or rad (axis: two tilts each)."""
+
+
+class Sources(NamedTuple):
+    """Independent errors; hashable."""
+
+    name: tuple[str, ...]
+    """As `inertia[2]`, `com[0].y`, `axis[1].tilt1`."""
+    deviation: tuple[float, ...]
+    """Their standard deviations."""
+    tolerances: tuple[tuple[str, tuple[float, ...]], ...]
+    """By field, one for every link or joint."""
+
+
+def sources_of(robot: Robot, tolerances: Mapping[str, ArrayLike]) -> Sources:
+    """Return the errors that `tolerances` speak of, see `spread`.
+
+    Raises:
+        ValueError: for an unknown field, a negative tolerance, or the wrong number of them.
+    """
+    names, deviations, fields = [], [], []
+    for field, given in tolerances.items():
+        if field not in RELATIVE + ABSOLUTE:
+            raise ValueError(f"there are no tolerances for {field!r}; they are for {', '.join(RELATIVE + ABSOLUTE)}.")
+        count = len(getattr(robot, field))
+        values = numbers(field, np.broadcast_to(given, (count,)) if np.ndim(given) == 0 else given, (count,))
+        if (values < 0).any():
+            raise ValueError(f"the tolerance of {field!r} is {given}; it must not be negative.")
+        fields.append((field, tuple(values.tolist())))
+        parts = {"com": (".x", ".y", ".z"), "anchor": (".x", ".y", ".z"), "axis": (".tilt1", ".tilt2")}.get(
+            field, ("",)
+        )
+        for i, value in enumerate(values):
+            names += [f"{field}[{i}]{part}" for part in parts]
+            deviations += [float(value)] * len(parts)
+    if not names:
+        raise ValueError("`tolerances` is empty; it must name at least one field.")
+    return Sources(tuple(names), tuple(deviations), tuple(fields))
+
+
+def perturbed(robot: Robot, sources: Sources, errors: Float[Array, " k"]) -> Robot:
+    """The robot with errors given in standard deviations. Its links stay possible rigid bodies at any errors.
+
+    Relative errors are factors exp(deviation * error). An error of a mass takes the link's inertia with it.
+    """
+    place = 0
+    changed = {}
+    moved = errors * jnp.asarray(sources.deviation, errors.dtype)
+
+    def value(field: str) -> Array:
+        return changed.get(field, getattr(robot, field))
+
+    for field, values in sources.tolerances:
+        width = {"com": 3, "anchor": 3, "axis": 2}.get(field, 1)
+        part = moved[place : place + width * len(values)].reshape(len(values), width)
+        place += width * len(values)
+        factor = jnp.exp(part[:, 0])
+        if field in ("com", "anchor"):
+            changed[field] = value(field) + part
+        elif field == "axis":
+            changed[field] = _tilted(value(field), part)
+        elif field == "inertia":
+            changed[field] = value(field) * factor[:, None, None]
+        else:
+            changed[field] = value(field) * factor
+        if field == "mass":
+            changed["inertia"] = value("inertia") * factor[:, None, None]
+    return robot.replace(**changed)
+
+
+def across(axis: Array) -> Array:
+    """Two unit vectors (2, 3) across a unit vector, at right angles to each other."""
+    smallest = jnp.eye(3, dtype=axis.dtype)[jnp.argmin(jnp.abs(axis))]
+    first = jnp.cross(jnp.asarray(axis), smallest)
+    first = first / jnp.sqrt(first @ first)
+    return jnp.stack([first, jnp.cross(jnp.asarray(axis), first)])
+
+
+def _tilted(axes: Array, tilts: Array) -> Array:
+    rows = []
+    for axis, tilt in zip(axes, tilts, strict=True):
+        unit = axis / jnp.sqrt(axis @ axis)
+        turned = unit + tilt @ across(unit)
+        rows.append(turned / jnp.sqrt(turned @ turned))
+    return jnp.stack(rows)

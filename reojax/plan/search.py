@@ -1,0 +1,150 @@
+"""Solving words for targets: damped Gauss-Newton within the box, then less travel along the solutions.
+
+Both run on the table, on many rows at once, one program per number of slots. Nothing here raises: what is not
+solved says so by its residual.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from reojax._arrays import Array
+from reojax.plan.chain import Miss, Word, chained, dual, miss, pull, step
+from reojax.plan.loops import Table, read
+
+_SOLVED = 1e-14
+"""Squared residual [rad^2] at which the search on the table stops; the true rotations take over."""
+_FEASIBLE = 1e-10
+"""Squared residual up to which a shortened word still counts as on the target."""
+
+
+class Found(NamedTuple):
+    """Amplitudes found."""
+
+    x: Float[Array, "d k m"]
+    """Amplitudes [rad]."""
+    square: Float[Array, " m"]
+    """Squared residual on the table [rad^2]."""
+
+
+@partial(jax.jit, static_argnums=3)
+def solve(table: Table, word: Word, x: Array, steps: int = 16) -> Found:
+    """Bring words to their targets by Levenberg-Marquardt steps, clipped to the box."""
+    at = miss(table, word, x)
+    used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
+
+    def body(state):
+        i, x, at, strength = state
+        length = jnp.sqrt(at.square)
+        damping = strength * length * (at.jacobian**2).sum((0, 1, 2))
+        dx = _inside(x, word, used, lambda free, held: step(at, free, held, damping))
+        tried = jnp.clip(x + dx, word.low, word.high)
+        then = miss(table, word, tried)
+        better = then.square < at.square
+        strength = jnp.clip(jnp.where(better, 0.2 * strength, 6 * strength), 1e-4, 1e6)
+        return i + 1, jnp.where(better[None, None], tried, x), _choose(better, then, at), strength
+
+    def going(state):
+        i, _, at, strength = state
+        return (i < steps) & ((at.square > _SOLVED) & (strength < 1e5)).any()
+
+    start = (0, x, at, jnp.full_like(at.square, 0.3))
+    _, x, at, _ = jax.lax.while_loop(going, body, start)
+    return Found(x, at.square)
+
+
+@partial(jax.jit, static_argnums=4)
+def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], steps: int = 20) -> Found:
+    """Move solved words along their solutions to less travel, `sum(price |x|)`, each amplitude keeping its sign."""
+    sign = jnp.where(x < 0, -1.0, 1.0).astype(x.dtype)
+    used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
+    word = word._replace(low=jnp.where(sign > 0, 0.0, word.low), high=jnp.where(sign > 0, word.high, 0.0))
+    slope = price * sign
+    zero = jnp.zeros_like(x[0, 0])
+
+    def direction(at: Miss, free: Array, held: Array, reach: Array) -> Array:
+        downhill = jnp.where(free, slope, 0.0)
+        force = dual(at.jacobian, free, zero, (at.jacobian * downhill[:, :, None]).sum((0, 1)))
+        along = pull(at.jacobian, force, free) - downhill
+        longest = jnp.abs(along).max((0, 1))
+        return (reach / jnp.where(longest > 0, longest, 1.0))[None, None] * along + step(at, free, held, zero)
+
+    def body(_, state):
+        x, at, reach = state
+
+        def move(i, moving):  # first along the solutions, then twice back to them
+            tried, then = moving
+            length = jnp.where(i == 0, reach, 0.0)
+            dx = _inside(tried, word, used, lambda free, held: direction(then, free, held, length))
+            tried = jnp.clip(tried + dx, word.low, word.high)
+            return tried, miss(table, word, tried)
+
+        tried, then = jax.lax.fori_loop(0, 3, move, (x, at))
+        less = (slope * (tried - x)).sum((0, 1)) < 0
+        better = less & (then.square < _FEASIBLE)
+        reach = jnp.clip(jnp.where(better, 1.8 * reach, 0.3 * reach), 1e-6, 1.0)
+        return jnp.where(better[None, None], tried, x), _choose(better, then, at), reach
+
+    state = (x, miss(table, word, x), jnp.full_like(zero, 0.2))
+    x, at, _ = jax.lax.fori_loop(0, steps, body, state)
+    return Found(x, at.square)
+
+
+@jax.jit
+def refine(
+    table: Table, word: Word, x: Array, true: Float[Array, "4 k m"], strength: Float[Array, " m"]
+) -> tuple[Array, Array]:
+    """Residuals with the `true` rotations of the loops, and amplitudes after a step from them, damped by `strength`.
+
+    The derivatives are those of the table, good to some 1e-5, so that each step takes about five digits off.
+    """
+    near, slopes = read(table, word.letter, x)
+    same_sign = jnp.where(((true * near).sum(0) < 0)[None], -true, true)
+    at = chained(word, same_sign, slopes)
+    used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
+    damping = strength * (at.jacobian**2).sum((0, 1, 2))
+    dx = _up_to_the_edge(x, word, used, lambda free, held: step(at, free, held, damping))
+    return at.square, jnp.clip(x + dx, word.low, word.high)
+
+
+def _inside(x: Array, word: Word, used: Array, direction: Callable[[Array, Array], Array]) -> Array:
+    """Step in which amplitudes on the edge of the box that would leave it are held.
+
+    Args:
+        x: amplitudes, inside the box.
+        word: holds the box.
+        used: slots that exist.
+        direction: step of the free amplitudes, given which are free and the steps of those that are not.
+    """
+    rest = jnp.zeros_like(x)
+
+    def hold(_, state):
+        free, dx = state
+        free = free & ~(((x <= word.low) & (dx < 0)) | ((x >= word.high) & (dx > 0)))
+        return free, direction(free, rest)
+
+    return jax.lax.fori_loop(0, 3, hold, (used, rest))[1]
+
+
+def _up_to_the_edge(x: Array, word: Word, used: Array, direction: Callable[[Array, Array], Array]) -> Array:
+    """Step in which amplitudes that would leave the box go to its edge, and the others make up for it.
+
+    For short steps; with long ones all amplitudes would end on the edge. Arguments as for `_inside`.
+    """
+
+    def hold(_, state):
+        free, dx = state
+        held = jnp.where(free, 0.0, dx)
+        dx = jnp.where(free, direction(free, held), dx)
+        beyond = (x + dx < word.low) | (x + dx > word.high)
+        return free & ~beyond, jnp.where(beyond, jnp.clip(x + dx, word.low, word.high) - x, dx)
+
+    return jax.lax.fori_loop(0, 4, hold, (used, jnp.zeros_like(x)))[1]
+
+
+def _choose(better: Array, then: Miss, at: Miss) -> Miss:
+    return jax.tree.map(lambda a, b: jnp.where(better.reshape(*(1,) * (a.ndim - 1), -1), a, b), then, at)
