@@ -46,7 +46,7 @@ def summary(problem: Problem, loop: Loops, found: Solution, target: np.ndarray, 
     return {
         "loop": loop.name,
         "starts": len(found.cost),
-        "converged": int(found.converged.sum()),
+        "starts_converged": int(found.converged.sum()),
         "starts_at_best": at_best(found),
         "best_converged": bool(found.converged[found.best]),
         "travel_deg": float(np.rad2deg(reojax.joint_travel(path))),

@@ -65,9 +65,8 @@ def zxz_rms(tracking: Tracking, planned: np.ndarray) -> np.ndarray:
 
 
 def section(out: Path, *, quick: bool, durations: Sequence[float] = DURATIONS) -> dict[str, Any]:
-    """Track A and B with both controllers, tune them anew, and draw; the rows for the table and all numbers."""
+    """Track A and B, draw, and (not when quick) tune the controllers anew; the rows for the table and all numbers."""
     robot = robots.prototype()
-    grid = np.geomspace(25, 400, 5 if quick else 13)
     result: dict[str, Any] = {"durations_s": list(durations), "cases": [], "rows": []}
     for manoeuvre, trajectory in plans(durations).items():
         ideal = released(robot, trajectory, steps=64)
@@ -98,16 +97,19 @@ def section(out: Path, *, quick: bool, durations: Sequence[float] = DURATIONS) -
                     robot, done, planned, title="Manoeuvre A at 270°/120° under soft PID control"
                 )
                 plot.save(figure, out / "drop_tower_tracking.png")
-    lag = tune(robot, grid, durations)
-    result["tuning"] = {
-        "bandwidth_rad_s": grid,
-        "joint_rms_rad": lag,
-        "best_rad_s": {k: best(grid, v) for k, v in lag.items()},
-    }
     if not quick:
-        chosen = {name: bandwidth for name, (_, bandwidth) in CONTROLLERS.items()}
-        plot.save(plot.bandwidth_figure(grid, lag, chosen), out / "drop_tower_tuning.png")
+        result["tuning"] = _tuned(robot, out, durations)
     return result
+
+
+def _tuned(robot: reojax.Robot, out: Path, durations: Sequence[float]) -> dict[str, Any]:
+    """Tune both controllers anew, and draw how much the bandwidth matters."""
+    grid = np.geomspace(25, 400, 13)
+    lag = tune(robot, grid, durations)
+    chosen = {name: bandwidth for name, (_, bandwidth) in CONTROLLERS.items()}
+    plot.save(plot.bandwidth_figure(grid, lag, chosen), out / "drop_tower_tuning.png")
+    tuned = {name: best(grid, values) for name, values in lag.items()}
+    return {"bandwidth_rad_s": grid, "joint_rms_rad": lag, "best_rad_s": tuned}
 
 
 def _rows(case: dict[str, Any]) -> list[tuple[str, str, str]]:

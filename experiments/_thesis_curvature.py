@@ -20,6 +20,7 @@ from jaxtyping import Float
 from numpy.polynomial import chebyshev, legendre
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+from tqdm import tqdm
 
 import reojax
 from reojax import so3
@@ -219,7 +220,7 @@ def study(robot: reojax.Robot, last: float, sizes: np.ndarray, reach: tuple[floa
         for name in NAMES[::2]
     ]
     angle, miss = np.zeros(len(sizes)), np.zeros((len(NAMES), len(sizes)))
-    for i, size in enumerate(sizes):
+    for i, size in enumerate(tqdm(sizes, desc="curvature", unit=" loops")):
         points, weights = nodes(size * reach[0], size * reach[1])
         local = plane(robot, last, points)
         corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]) * size * reach @ directions(last).T

@@ -140,7 +140,7 @@ def animation(frames: plot.Frames, file: Path, *, count: int) -> None:
     step = max(len(frames.theta) // count, 1)
     chosen = every(frames, step)
     names = [EDGES[min(k * step // SAMPLES, len(EDGES) - 1)] for k in range(len(chosen.theta))]
-    plot.animate(robots.prototype(), chosen, file, seconds=5.0, titles=names)
+    plot.animate(robots.prototype(), chosen, file, seconds=5.0, titles=names, progress=True)
 
 
 def every(frames: plot.Frames, step: int) -> plot.Frames:

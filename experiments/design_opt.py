@@ -47,7 +47,7 @@ def main(out: Path, *, quick: bool = False, target: float = 180.0) -> dict:
     curves = trade_off(np.deg2rad(target), points=5 if quick else 13)
 
     print(f"\nPrototype turned by {target:g} deg of roll, all three components, least joint travel within 270/120\n")
-    rows = ("starts", "converged", "starts_at_best", "travel_deg", "residual_rad", "slope", "miss_off_axis_rad",
+    rows = ("starts", "starts_converged", "starts_at_best", "travel_deg", "residual_rad", "slope", "miss_off_axis_rad",
             "replay_rad", "gradient_error")  # fmt: skip
     table(["", *(loop["loop"] for loop in loops)], [[row, *(loop[row] for loop in loops)] for row in rows], width=26)
     print("\nManoeuvre A, roll as wanted: least travel [deg] over one parameter, the other as in the thesis, or free\n")
@@ -85,7 +85,7 @@ def best_loops(roll: float, *, quick: bool) -> list[dict[str, Any]]:
         found = problem.solve(starts, seed=1, hold={"target": target}, progress=loop.name, max_steps=100)
         answers.append(summary(problem, loop, found, target, steps=steps))
     corners = [np.deg2rad(answer["waypoints_deg"]) for answer in answers]
-    for answer, error in zip(answers, gradient_error(robot, corners, steps=4 if quick else 2), strict=True):
+    for answer, error in zip(answers, gradient_error(robot, corners, steps=4), strict=True):
         answer["gradient_error"] = error
     return answers
 
@@ -167,7 +167,7 @@ def _picture(loops: list[dict[str, Any]], curves: dict[str, dict[str, Any]], tar
     grid, wide = figure.add_gridspec(2, 6), 6 // len(loops)
     for i, loop in enumerate(loops):
         axes = figure.add_subplot(grid[0, wide * i : wide * (i + 1)])
-        axes.set_ylim(-300, 300)
+        axes.set_ylim(-300, 340)
         corners = np.array(loop["waypoints_deg"])
         along = np.concatenate([[0], np.cumsum(np.abs(np.diff(corners, axis=0)).sum(1))])
         for name, angle, colour, line in zip(
@@ -178,7 +178,7 @@ def _picture(loops: list[dict[str, Any]], curves: dict[str, dict[str, Any]], tar
         axes.grid(axis="y", color="#dddddd")
         axes.spines[["top", "right"]].set_visible(False)
     figure.axes[0].set_ylabel("joint angle [deg]")
-    figure.axes[0].legend(frameon=False, ncols=3, loc="lower left", fontsize=8)
+    figure.axes[0].legend(frameon=False, ncols=3, loc="upper left", fontsize=8)
     for i, ((name, curve), mark) in enumerate(zip(curves.items(), THESIS, strict=True)):
         axes = figure.add_subplot(grid[1, 3 * i : 3 * (i + 1)])
         x, travel = np.array(curve["values"]), np.array(curve["travel_deg"])

@@ -1,6 +1,6 @@
 """What does the thesis's drop tower ask of robot, motors and controllers, and what would the cameras see?
 
-    python experiments/drop_tower.py --out out          # some minutes on 2 cores; --quick: fewer points
+    python experiments/drop_tower.py --out out          # 2 to 3 minutes on 2 cores; --quick: no tuning, 1 minute
 
 The whole story of thesis 1.8 in one run: the fall, the plan, joints under control in closed loop, an imperfect release,
 and a capture beside the simulation. Its sections are the modules `_drop_tower_*.py`. One table holds what the thesis

@@ -40,10 +40,9 @@ def main(out: Path, *, quick: bool = False) -> dict:
     answer["rectangle_pitch_deg"] = rectangle_pitch(robot, 5 if quick else 13)
 
     print("\nLeast travel to 90 degrees of pitch, prototype within 270/120\n")
-    table(["", answer["loop"]], [[key, answer[key]] for key in (
-        "starts", "starts_at_best", "travel_deg", "residual_rad", "slope", "miss_along_rad", "miss_off_axis_rad",
-        "replay_rad",
-    )], width=24)  # fmt: skip
+    rows = ("starts", "starts_converged", "starts_at_best", "travel_deg", "residual_rad", "slope", "miss_along_rad",
+            "miss_off_axis_rad", "replay_rad")  # fmt: skip
+    table(["", answer["loop"]], [[row, answer[row]] for row in rows], width=24)
     print("\ncorners [deg]: twist1, bend, twist2")
     for corner in answer["waypoints_deg"]:
         print("".join(f"{angle:10.3f}" for angle in corner))

@@ -109,7 +109,7 @@ def _picture(rows: dict[str, dict[str, Any]], spreads: dict[str, design.Spread])
             turns[:, 2], np.hypot(turns[:, 0], turns[:, 1]), mark, color=colour, alpha=0.45, markersize=3, label=name
         )
     cloud.set(xlabel="error of the roll [deg]", ylabel="off-axis turn [deg]", title="Sampled robots, inertias ± 5 %")
-    cloud.legend(frameon=False)
+    cloud.legend(framealpha=0.95)
     cloud.grid(color="#dddddd")
     for axes in figure.axes:
         axes.spines[["top", "right"]].set_visible(False)

@@ -160,7 +160,7 @@ def evolution(robot: reojax.Robot, loop: Loops, *, steps: int, generations: int)
             updating="deferred",
             polish=False,
             tol=0,
-            callback=lambda *_, **__: bool(bar.update()),
+            callback=lambda *_, **__: bar.update() and False,
         )
     seconds = time.perf_counter() - begin
     travel, miss = (np.asarray(part)[0] for part in travel_and_miss(jnp.asarray(found.x)[None]))

@@ -8,7 +8,7 @@ angles. Then a picture that the thesis does not have: the curvature of the local
 and how well its surface integral predicts the net rotation of loops of all sizes, in the base frame and in the frame in
 which the connection is smallest.
 
-Expected: all that the thesis says of figures 2.5 to 2.10 holds. Four claims do not hold for the prototype as it is here:
+Expected: all that the thesis says of figures 2.5 to 2.10 holds. Four claims do not hold for the prototype as it is:
 growth of A as twist * bend^2 at small amplitudes, the sign of the bend, a third ZXZ angle that returns to zero, and the
 centre joint's motor of figure 3.2. The surface integral in the best frame is within 3 degrees of A's half turn, in the
 base frame it is off by 46.
@@ -41,7 +41,7 @@ def main(out: Path, *, quick: bool = False) -> dict:
     a, b = (plot.frames_along(robot, path, per_edge=pictures.SAMPLES) for path in (FULL_A, FULL_B))
     draw(grids, a, b, png)
     for name, frames in (("2_5", a), ("2_6", b)):
-        pictures.animation(frames, gif[name], count=8 if quick else 64)
+        pictures.animation(frames, gif[name], count=4 if quick else 64)
 
     sizes = np.geomspace(0.02, 1, 5 if quick else 15)
     errors = {}

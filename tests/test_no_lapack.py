@@ -54,3 +54,18 @@ def test_derivatives(name, mode):
     text = program(function, *arguments)
     assert "stablehlo" in text
     assert "lapack_" not in text
+
+
+PLAN = reojax.Trajectory(np.array([0.0, 0.002]), CORNERS[None])
+LOOPS = {
+    "released": lambda robot, path: reojax.released(robot, PLAN, reojax.Release((*path[1], 1.0)), steps=2),
+    "track": lambda robot, path: reojax.track(robot, PLAN, reojax.RE_MAX_17, reojax.Gains(*path[1] ** 2, 1.0)),
+}
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_values_of_loops_over_time(name):
+    function, arguments = batched(LOOPS[name])
+    text = program(function, *arguments)
+    assert "stablehlo" in text
+    assert "lapack_" not in text

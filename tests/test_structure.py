@@ -14,7 +14,7 @@ LAYERS = [
     ["_smallmat", "_orientation", "so3", "robot", "path"],
     ["momentum", "manoeuvres"],
     ["_fast.scalar", "_fast.sincos", "_fast.nodes"],
-    ["_fast.components", "_fast.product", "_fast.store"],
+    ["_fast.components", "_fast.product", "_fast.store", "_fast.blocks"],
     ["_fast.omega", "_fast.steps"],
     ["_fast.momentum"],
     ["_fast.endpoint"],

@@ -204,6 +204,14 @@ def test_ctrl_c_keeps_what_is_stored(tmp_path, monkeypatch, caplog):
     assert len(list((tmp_path / "s").glob("chunk-*.npz"))) == 2
 
 
+def test_axes_of_another_sweep_in_a_store_are_noticed(tmp_path):
+    small(tmp_path / "s")
+    small(tmp_path / "t", axes={"x": AXES["x"], "y": np.array([1.0, 3.0])})
+    (tmp_path / "s" / "axes.npz").write_bytes((tmp_path / "t" / "axes.npz").read_bytes())
+    with pytest.raises(ValueError, match=r"axes.npz and sweep.json do not belong together"):
+        merge(tmp_path / "s")
+
+
 @pytest.mark.parametrize("damage", [b"", b"{}", b'{"identity": {"schema": "x"}, "units": {}}'])
 def test_a_folder_that_is_no_store(tmp_path, damage):
     with pytest.raises(ValueError, match="is not the store of a sweep"):

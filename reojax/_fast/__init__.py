@@ -13,6 +13,7 @@ quadrature nodes of the path. Files, in the order of use:
     steps       omega at the nodes of a step to the rotation over the step
     product     the ordered product of the steps' rotations
     endpoint    all of it in a row, and its derivative, which needs
-    momentum    the angular momentum with everything moving, and
-    store       values computed once for many readers
+    momentum    the angular momentum with everything moving,
+    store       values computed once for many readers, and
+    blocks      batches of designs in blocks that stay in the cache
 """

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from reojax._arrays import is_concrete
-from reojax._fast.scalar import Scalar, Symmetric, Vector, dot
+from reojax._fast.scalar import Scalar, Symmetric, Vector, dot, mul, plus, point_inertia, times
 from reojax.robot import Robot
 
 _FIELDS = ("mass", "com", "inertia", "axis", "anchor", "rotor_inertia", "gear_ratio")
@@ -26,8 +26,10 @@ class Components(NamedTuple):
     """What the recursion of `omega` reads, link by link and joint by joint."""
 
     mass: Sequence[Scalar]
-    com: Sequence[Vector]
+    moment: Sequence[Vector]
+    """Mass times centre of mass."""
     inertia: Sequence[Symmetric]
+    """About the link frame's origin."""
     axis: Sequence[Vector]
     anchor: Sequence[Vector]
     rotor_spin: Sequence[Scalar]
@@ -55,13 +57,14 @@ def components(robot: Robot, pattern: Pattern, dtype: np.dtype) -> Components:
         for field, known in zip(_FIELDS, pattern, strict=True)
     )
     signs = [1 if side == "parent" else -1 for side in robot.rotor_on]
+    about_com = [_symmetric_part(rows) for rows in inertia]
     return Components(
         mass=mass,
-        com=com,
-        inertia=[_symmetric_part(rows) for rows in inertia],
+        moment=[times(m, c) for m, c in zip(mass, com, strict=True)],
+        inertia=[plus(i, point_inertia(m, c)) for i, m, c in zip(about_com, mass, com, strict=True)],
         axis=[_unit(e) for e in axis],
         anchor=anchor,
-        rotor_spin=[sign * (j * n) for sign, j, n in zip(signs, rotor, gear, strict=True)],
+        rotor_spin=[mul(sign, mul(j, n)) for sign, j, n in zip(signs, rotor, gear, strict=True)],
         parent=robot.parent,
     )
 

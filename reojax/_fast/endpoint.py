@@ -7,86 +7,144 @@ at a fixed motion of the base: nothing of the inverse has to be differentiated. 
 motion being zero, its reference point and velocity may stay fixed too (their first-order effects cancel).
 The sum uses the nodes and values of the solution itself.
 Reverse mode is the transpose of this, which JAX finds: one constant vector turned into each node's frame, `A^-1`,
-and one pass through the momentum.
+and one pass through the momentum. It computes the values at the nodes again, block by block (`blocks`): keeping
+them from the first pass would take as long, and memory for all designs. What it is by are the masses, moments and so
+on of `components`; from there to the arrays of a robot JAX differentiates as usual.
 """
 
 from functools import partial
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
-from reojax._fast.components import Components, Pattern, components
+from reojax._fast.blocks import Call, in_blocks
+from reojax._fast.components import Components
 from reojax._fast.momentum import angular_momentum
-from reojax._fast.nodes import path_nodes, to_nodes
+from reojax._fast.nodes import NODES, path_nodes, to_nodes
 from reojax._fast.omega import Base, inward, solve
 from reojax._fast.product import Triple, ordered_products, rotate, times, to_matrix
 from reojax._fast.scalar import cross, plus, times as scale
 from reojax._fast.sincos import sincos
 from reojax._fast.steps import Step, mean_over_step, step_rotations
 from reojax._fast.store import keeper
-from reojax.robot import Robot
 
 
-def steps_of_path(robot: Robot, points: jax.Array, steps: int, pattern: Pattern) -> Step:
+class Problem(NamedTuple):
+    """What is known while tracing."""
+
+    steps: int
+    structure: Any
+    """Of `Components`, as a tree."""
+    known: tuple[float | None, ...]
+    """Its entries, `None` for the ones given as data."""
+    varied: tuple[int, ...] = ()
+    """Entries of the data that a derivative is by."""
+    moved: bool = False
+    """Whether it is by the path too."""
+
+    def robot(self, numbers: list[jax.Array]) -> Components:
+        """Put the data in its place."""
+        data = iter(numbers)
+        return jax.tree.unflatten(self.structure, [next(data) if k is None else k for k in self.known])
+
+
+def steps_of_path(robot: Components, points: jax.Array, steps: int) -> Step:
     """Rotation over each of the `steps` steps of each edge, in order."""
     theta, rate = path_nodes(points, steps)
-    base = inward(components(robot, pattern, points.dtype), [sincos(a) for a in theta], rate)
+    base = inward(robot, [sincos(a) for a in theta], rate)
     return step_rotations(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0]))
+
+
+def end_rotation(robot: Components, points: jax.Array, steps: int) -> jax.Array:
+    """Rotation (3, 3) after the polygon `points` (v, j), v >= 2; all arrays of one dtype."""
+    entries, structure = jax.tree.flatten(robot)
+    known = tuple(entry if isinstance(entry, int | float) else None for entry in entries)
+    numbers = [entry for entry in entries if not isinstance(entry, int | float)]
+    return _end_rotation(Problem(steps, structure, known), numbers, points)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
+def _end_rotation(problem: Problem, numbers: list[jax.Array], points: jax.Array) -> jax.Array:
+    call = Call(_rotation, problem, ((3, 3),), _nodes(problem, points))
+    return in_blocks(call, _together(numbers, points), points)[0]
+
+
+@partial(_end_rotation.defjvp, symbolic_zeros=True)
+def _end_rotation_jvp(problem, primals, tangents):
+    rotation = _end_rotation(problem, *primals)
+    numbers, points = primals
+    by_numbers, by_points = tangents
+    varied = tuple(i for i, change in enumerate(by_numbers) if not isinstance(change, SymbolicZero))
+    problem = problem._replace(varied=varied, moved=not isinstance(by_points, SymbolicZero))
+    changes = ([jnp.stack([by_numbers[i] for i in varied])] if varied else []) + [by_points] * problem.moved
+    if not changes:
+        return rotation, jnp.zeros_like(rotation)
+    call = Call(_push, problem, ((3,),), _nodes(problem, points), transpose=_pull, linear=len(changes))
+    turn = in_blocks(call, _together(numbers, points), points, *changes)[0]
+    return rotation, jnp.cross(turn[:, None], rotation, axis=0)
+
+
+def _nodes(problem: Problem, points: jax.Array) -> int:
+    return (points.shape[0] - 1) * problem.steps * len(NODES)
+
+
+def _rotation(problem: Problem, numbers: jax.Array, points: jax.Array) -> list[jax.Array]:
+    total, _ = ordered_products(steps_of_path(problem.robot(_apart(numbers)), points, problem.steps).rotation)
+    return [to_matrix(total)]
+
+
+def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax.Array) -> list[jax.Array]:
+    """How the end turns, seen from the start, with changes of the data and of the path."""
+    data = _apart(numbers)
+    theta, rate = path_nodes(points, problem.steps)
+    keep = keeper(theta[0])
+    sine_cosine = [keep(sincos(angle)) for angle in theta]
+    base = inward(problem.robot(data), sine_cosine, rate)
+    base = Base(*(keep(part) for part in base))
+    omega = _at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0])
+    step = step_rotations(omega)
+    _, before = ordered_products(step.rotation)
+    velocity = scale(-1, plus(base.drift, cross(omega, base.centre)))
+
+    def momentum(varied, points):
+        now = [to_nodes(value, theta[0]) for value in data]
+        for i, value in zip(problem.varied, varied, strict=True):
+            now[i] = to_nodes(value, theta[0])
+        theta_, rate_ = (keep(values) for values in path_nodes(points, problem.steps))
+        of_all = angular_momentum(
+            problem.robot(now), [sincos(a) for a in theta_], rate_, omega, velocity, base.centre, keep
+        )
+        return _at_nodes(of_all, theta[0])
+
+    given = iter(changes)
+    by_data = _apart(next(given)) if problem.varied else []
+    by_points = next(given) if problem.moved else jnp.zeros_like(points)
+    _, change = jax.jvp(momentum, ([data[i] for i in problem.varied], points), (by_data, by_points))
+    change_of_omega = _at_nodes(solve(base.inertia, scale(-1, change)), theta[0])
+    in_step = mean_over_step(step.inside(keep(change_of_omega), keep))
+    in_step = keeper(step.half[0])(in_step)
+    x, y, z = (c.sum() for c in rotate(times(before, step.half), in_step))
+    return [jnp.stack([x, y, z])]
+
+
+def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.Array) -> list[jax.Array]:
+    """Transpose of `_push`."""
+    shapes = [jax.ShapeDtypeStruct((len(problem.varied),), points.dtype)] * bool(problem.varied)
+    shapes += [jax.ShapeDtypeStruct(points.shape, points.dtype)] * problem.moved
+    push = jax.linear_transpose(lambda *changes: _push(problem, numbers, points, *changes)[0], *shapes)
+    return list(push(by_turn))
+
+
+def _together(numbers: list[jax.Array], like: jax.Array) -> jax.Array:
+    return jnp.stack(numbers) if numbers else jnp.zeros(0, like.dtype)
+
+
+def _apart(numbers: jax.Array) -> list[jax.Array]:
+    # `split`, unlike indexing, has a cheap transpose: one concatenation
+    return [x.reshape(()) for x in jax.lax.split(numbers, (1,) * numbers.size)] if numbers.size else []
 
 
 def _at_nodes(vector, like: jax.Array) -> Triple:
     return tuple(jnp.broadcast_to(jnp.asarray(c, like.dtype), like.shape) for c in vector)
-
-
-@partial(jax.custom_jvp, nondiff_argnums=(0, 1))
-def end_rotation(steps: int, pattern: Pattern, robot: Robot, points: jax.Array) -> jax.Array:
-    """Rotation (3, 3) after the polygon `points` (v, j), v >= 2; all arrays of one dtype."""
-    total, _ = ordered_products(steps_of_path(robot, points, steps, pattern).rotation)
-    return to_matrix(total)
-
-
-@partial(end_rotation.defjvp, symbolic_zeros=True)
-def _end_rotation_jvp(steps, pattern, primals, tangents):
-    robot, points = primals
-    theta, rate = path_nodes(points, steps)
-    keep = keeper(theta[0])
-    sine_cosine = [keep(sincos(angle)) for angle in theta]
-    base = inward(components(robot, pattern, points.dtype), sine_cosine, rate)
-    base = Base(*(keep(part) for part in base))
-    omega = _at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0])
-    step = step_rotations(omega)
-    total, before = ordered_products(step.rotation)
-    rotation = to_matrix(total)
-
-    velocity = scale(-1, plus(base.drift, cross(omega, base.centre)))
-    leaves, structure = jax.tree.flatten((robot, points))
-    changes = jax.tree.leaves(tangents, is_leaf=lambda t: isinstance(t, SymbolicZero))
-    varied = [i for i, change in enumerate(changes) if not isinstance(change, SymbolicZero)]
-    if not varied:
-        return rotation, jnp.zeros_like(rotation)
-
-    def momentum(values):
-        now = list(leaves)
-        for i, value in zip(varied, values, strict=True):
-            now[i] = value
-        robot, points = jax.tree.unflatten(structure, now)
-        theta, rate = path_nodes(points, steps)
-        parts = _spread_components(components(robot, pattern, points.dtype), theta[0])
-        of_all = angular_momentum(parts, [sincos(a) for a in theta], rate, omega, velocity, base.centre, keep)
-        return _at_nodes(of_all, theta[0])
-
-    _, change = jax.jvp(momentum, ([leaves[i] for i in varied],), ([changes[i] for i in varied],))
-    change_of_omega = _at_nodes(solve(base.inertia, scale(-1, change)), theta[0])
-    in_step = mean_over_step(step.inside(keep(change_of_omega), keep))
-    x, y, z = (c.sum() for c in rotate(times(before, step.half), in_step))
-    turn = jnp.stack([x, y, z])
-    return rotation, jnp.cross(turn[:, None], rotation, axis=0)
-
-
-def _spread_components(robot: Components, like: jax.Array) -> Components:
-    def at_nodes(value):
-        return value if isinstance(value, int) else to_nodes(value, like)
-
-    arrays = robot._replace(parent=())
-    return jax.tree.map(at_nodes, arrays)._replace(parent=robot.parent)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from reojax._fast.components import Components
 from reojax._fast.omega import apply_symmetric, joint_rotation
-from reojax._fast.scalar import Scalar, Vector, apply, cross, mul, plus, point_inertia, times, transpose
+from reojax._fast.scalar import Scalar, Vector, apply, cross, mul, plus, times, transpose
 from reojax._fast.store import Keep
 
 
@@ -28,8 +28,6 @@ def angular_momentum(
     `p + E p'`, `h + E h' + a x E p'`, and the rotors. Values are kept link by link (`store`), and so is what
     reverse differentiation carries outward.
     """
-    moment = [times(m, c) for m, c in zip(robot.mass, robot.com, strict=True)]
-    inertia = [plus(i, point_inertia(m, c)) for i, m, c in zip(robot.inertia, robot.mass, robot.com, strict=True)]
     joints = range(len(robot.parent))
     E = [joint_rotation(e, *sc) for e, sc in zip(robot.axis, sine_cosine, strict=True)]
     w, v = [omega], [velocity]
@@ -37,8 +35,11 @@ def angular_momentum(
         outward, parent = transpose(E[k]), robot.parent[k]
         w.append(keep(plus(apply(outward, w[parent]), times(rate[k], robot.axis[k]))))
         v.append(keep(apply(outward, plus(v[parent], cross(w[parent], robot.anchor[k])))))
-    p = [plus(times(m, v_), cross(w_, f)) for m, f, v_, w_ in zip(robot.mass, moment, v, w, strict=True)]
-    h = [plus(apply_symmetric(J, w_), cross(f, v_)) for J, f, v_, w_ in zip(inertia, moment, v, w, strict=True)]
+    p = [plus(times(m, v_), cross(w_, f)) for m, f, v_, w_ in zip(robot.mass, robot.moment, v, w, strict=True)]
+    h = [
+        plus(apply_symmetric(J, w_), cross(f, v_))
+        for J, f, v_, w_ in zip(robot.inertia, robot.moment, v, w, strict=True)
+    ]
     for k in reversed(joints):
         link, parent = k + 1, robot.parent[k]
         push = apply(E[k], keep(p[link]))

@@ -59,8 +59,7 @@ def omega(robot: Components, theta: Sequence[jax.Array], rate: Sequence[jax.Arra
 def inward(robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate: Sequence[Scalar]) -> Base:
     """Gather inertia and momentum from the tips to the base."""
     m = list(robot.mass)
-    f = [times(mass, com) for mass, com in zip(m, robot.com, strict=True)]
-    J = [plus(i, point_inertia(mass, com)) for i, mass, com in zip(robot.inertia, m, robot.com, strict=True)]
+    f, J = list(robot.moment), list(robot.inertia)
     p, h = [ZERO] * len(m), [ZERO] * len(m)
     for k in reversed(range(len(robot.parent))):
         link, parent, e, a = k + 1, robot.parent[k], robot.axis[k], robot.anchor[k]

@@ -28,7 +28,7 @@ import numpy as np
 from reojax._fast.nodes import LEGENDRE, NODES, WEIGHTS, per_step
 from reojax._fast.product import Quaternion, Triple, times
 from reojax._fast.sincos import horner, sincos
-from reojax._fast.store import Keep
+from reojax._fast.store import Keep, keeper
 
 _MOMENTS = WEIGHTS[:, None] * LEGENDRE[:, :6]
 """values (steps, 8) @ _MOMENTS = integrals of the values times the first six Legendre polynomials."""
@@ -101,8 +101,10 @@ def step_rotations(omega: Triple) -> Step:
     v = _fer(u, turned)
     m = _moments(v, _MOMENTS.shape[1])
     first = _combine((1.0, m[0]), *((0.5, _cross(a, b)) for a, b in pairwise(m)))
-    half = _exp(_combine((0.5, _moments(omega, 1)[0])))
-    rotation = times(times(half, times(_exp_small(first), _exp_small(_moments(u, 1)[0]))), half)
+    keep = keeper(m[0][0])
+    half = keep(_exp(_combine((0.5, _moments(omega, 1)[0]))))
+    inner = keep(times(_exp_small(first), _exp_small(_moments(u, 1)[0])))
+    rotation = keep(times(times(half, inner), half))
 
     def inside(vectors: Triple, keep: Keep) -> Triple:
         for turn in (_combine((s, mean)), turned, _at_nodes(v, _INTEGRAL)):

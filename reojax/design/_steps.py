@@ -115,8 +115,10 @@ def advance(problem: Problem, state: State) -> State:
     )
     here = jax.tree.map(lambda a, b: jnp.where(finite, a, b), here, state)  # not finite: stay where it was
     before, after = (_lagrangian_slope(s) for s in (state._replace(scale=here.scale), here))
-    curvature, fresh = _measured(state, here.x - state.x, after - before, ~first)
-    here = here._replace(curvature=curvature, fresh=fresh, slope=_slope(problem, here, after))
+    change = jnp.where(problem.upper > problem.lower, after - before, 0.0)  # held variables stay out of the curvature
+    curvature, fresh = _measured(state, here.x - state.x, change, ~first)
+    radius = jnp.where(finite, here.radius, 0.2 * here.radius)
+    here = here._replace(curvature=curvature, fresh=fresh, slope=_slope(problem, here, after), radius=radius)
     met = finite & (residual(here.now) <= problem.tolerance) & (here.slope <= problem.slope_tolerance)
 
     program = _program(problem, here)

@@ -26,7 +26,7 @@ _BENT = np.cos(np.deg2rad(20))
 """Centre of mass and centre of percussion seen under a smaller angle than this are on one straight beam."""
 _PIN = 0.14
 """Half the length of a joint's pin at most, as a share of the robot's size; a longer one would run along a link."""
-_INNER = 0.85
+_INNER = 0.5
 """Scale of a link that fills the same space as a heavier neighbour, so that the neighbour shows."""
 _THIN = 0.02
 """Thickness of the thinnest part, as a share of the robot's size."""

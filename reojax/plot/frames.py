@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from PIL import Image
+from tqdm import tqdm
 
 from reojax._arrays import as_numbers
 from reojax._output import check_writable, replacing
@@ -134,6 +135,7 @@ def animation(
     seconds: float = 4.0,
     titles: Sequence[str] | None = None,
     view: View | None = None,
+    progress: bool = False,
 ) -> None:
     """Write a GIF of a robot along a path at zero momentum, every edge equally long; whole or not at all.
 
@@ -145,6 +147,7 @@ def animation(
         seconds: how long the path takes. The last frame stays for a second, then it starts again.
         titles: a name for each edge.
         view: from where to look; default from the front, y up.
+        progress: whether to show progress on stderr.
 
     Raises:
         ValueError: if the file cannot be written, the path does not fit the robot, or a number is not positive.
@@ -161,7 +164,7 @@ def animation(
     names = None
     if titles is not None:
         names = [titles[min(k // per_edge, path.edges - 1)] for k in range(len(poses.theta))]
-    animate(robot, poses, target, seconds=seconds, titles=names, view=view)
+    animate(robot, poses, target, seconds=seconds, titles=names, view=view, progress=progress)
 
 
 def animate(
@@ -172,6 +175,7 @@ def animate(
     seconds: float = 4.0,
     titles: Sequence[str] | None = None,
     view: View | None = None,
+    progress: bool = False,
 ) -> None:
     """Write a GIF of a robot in given poses, equally spaced in time; whole or not at all.
 
@@ -182,6 +186,7 @@ def animate(
         seconds: from first to last pose. The last one stays for a second, then it starts again.
         titles: a line above each frame.
         view: from where to look; default from the front, y up.
+        progress: whether to show progress on stderr.
 
     Raises:
         ValueError: if the file cannot be written, a pose does not fit the robot, or a number is not positive.
@@ -195,7 +200,7 @@ def animate(
         raise ValueError(f"`titles` has {len(titles)} lines; there are {count} frames.")
     low, high = _extent(robot, frames)
     images = []
-    for k in range(count):
+    for k in tqdm(range(count), desc=target.name, unit=" frames", disable=not progress):
         figure = Figure(figsize=(3.6, 3.2), dpi=100, facecolor="white")
         canvas = FigureCanvasAgg(figure)
         axes = cast(Axes3D, figure.add_axes((0.0, 0.0, 1.0, 0.93), projection="3d"))

@@ -72,7 +72,7 @@ class _Fallback:
                 return self.alone.results(started, number, self.alone.mesh.devices.flat[0]), {}
         except Exception as error:
             if "RESOURCE_EXHAUSTED" in str(error):
-                raise MemoryError("a chunk does not fit into memory; choose a smaller `chunk_size`.") from error
+                raise ValueError("a chunk does not fit into memory; choose a smaller `chunk_size`.") from error
         start, stop = self.program.cut.bounds(number)
         results, failed = blank(self.outputs, stop - start), {}
         columns = self.program.designs.stretch(start, stop)

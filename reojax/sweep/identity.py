@@ -35,10 +35,7 @@ def identity(
         "reojax": _version(),
         "jax": jax.__version__,
         "platform": platform,
-        "axes": {
-            name: {"values": len(values), "dtype": str(values.dtype), "sha256": _sha256(values.tobytes())}
-            for name, values in designs.axes.items()
-        },
+        "axes": {name: axis_identity(values) for name, values in designs.axes.items()},
         "order": list(designs.axes),
         "zipped": designs.zipped,
         "function": _sha256(program.as_text().encode()),
@@ -49,6 +46,11 @@ def identity(
         "chunk": sizes.chunk,
         "block": sizes.block,
     }
+
+
+def axis_identity(values: np.ndarray) -> dict[str, Any]:
+    """Return what tells the values of an axis from others, as plain data."""
+    return {"values": len(values), "dtype": str(values.dtype), "sha256": _sha256(values.tobytes())}
 
 
 def digest(same: Mapping[str, Any]) -> str:

@@ -23,7 +23,7 @@ import numpy as np
 from reojax._output import replacing
 from reojax.sweep.chunks import Chunk, Cut
 from reojax.sweep.grid import Designs
-from reojax.sweep.identity import SCHEMA, differences, digest
+from reojax.sweep.identity import SCHEMA, axis_identity, differences, digest
 from reojax.sweep.outputs import Output
 
 MANIFEST, AXES = "sweep.json", "axes.npz"
@@ -58,20 +58,12 @@ class Store:
     def put(self, chunk: Chunk) -> None:
         """Write a chunk, whole or not at all."""
         start, stop = self.sizes.bounds(chunk.number)
-        members = {f"results/{o.name}": values for o, values in zip(self.outputs, chunk.results, strict=True)}
+        members = {"hash": np.array(self.hash), "start": np.array(start), "stop": np.array(stop)}
+        members["bad/design"] = np.array(list(chunk.bad), np.int64)
+        members["bad/reason"] = np.array(list(chunk.bad.values()), str)
+        members |= {f"results/{o.name}": values for o, values in zip(self.outputs, chunk.results, strict=True)}
         with replacing(self.file(chunk.number)) as file:
-            np.savez(
-                file,
-                allow_pickle=False,
-                hash=np.array(self.hash),
-                start=np.array(start),
-                stop=np.array(stop),
-                **{
-                    "bad/design": np.array(list(chunk.bad), np.int64),
-                    "bad/reason": np.array([*chunk.bad.values()], str),
-                },
-                **members,
-            )
+            np.savez(file, allow_pickle=False, **members)
 
     def get(self, number: int) -> Chunk | None:
         """Read a chunk; None if it is not there, damaged, or of another sweep."""
@@ -131,6 +123,8 @@ def open_store(folder: str | os.PathLike[str]) -> Store:
             raise ValueError(f"its layout is {manifest['identity']['schema']!r}; this reojax reads {SCHEMA!r}")
         with np.load(place / AXES, allow_pickle=False) as file:
             axes = {name: file[f"axes/{name}"] for name in manifest["identity"]["order"]}
+        if {name: axis_identity(values) for name, values in axes.items()} != manifest["identity"]["axes"]:
+            raise ValueError(f"{AXES} and {MANIFEST} do not belong together")
         return Store(place, manifest, Designs(axes, manifest["identity"]["zipped"]))
     except Exception as error:
         raise ValueError(f"{str(folder)!r} is not the store of a sweep: {_text(error)}.") from error
@@ -144,9 +138,12 @@ def _write_once(path: Path, text: str) -> None:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-        os.link(temporary, path)
-    except FileExistsError:
-        pass
+        try:
+            os.link(temporary, path)
+        except FileExistsError:
+            pass
+        except OSError:  # a file system without links
+            os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
 
