@@ -16,6 +16,7 @@ from typing import Any
 
 import _drop_tower_capture
 import _drop_tower_release
+import _drop_tower_time
 import _drop_tower_tracking
 import numpy as np
 from _script import options, run
@@ -65,6 +66,7 @@ def main(out: Path, *, quick: bool = False) -> dict[str, Any]:
     sections = {
         "fall": the_fall(),
         "plan": the_plan(),
+        "time": _drop_tower_time.section(out, quick=quick),
         "tracking": _drop_tower_tracking.section(out, quick=quick),
         "release": _drop_tower_release.section(quick=quick),
         "capture": _drop_tower_capture.section(out),

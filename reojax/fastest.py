@@ -18,6 +18,7 @@ from tqdm import tqdm
 
 from reojax import so3
 from reojax._arrays import Array, as_numbers
+from reojax.design.solver import optimise
 from reojax.dynamics import joint_load
 from reojax.holonomy import net_rotation
 from reojax.minimum_time import instants, minimum_stretch, minimum_time
@@ -238,13 +239,19 @@ def _fastest(
     def miss(x: Array) -> Array:
         return so3.log(jnp.asarray(task.goal).T @ net_rotation_of(robot, task.build(x), _SAMPLES))
 
-    def everything(unit: Array) -> Array:
-        x = unit * scale
-        return jnp.concatenate([task.cost(x)[None], jnp.zeros(0) if task.goal is None else miss(x), -within(x)])
+    if task.goal is None:  # many rows and no curved ones: what the batched solver is better at
+        found = optimise(
+            task.cost, starts, lower=lower, upper=upper, scale=scale, inequality=within,
+            tolerance=1e-7, slope_tolerance=1e-4, max_steps=max_steps, progress=progress,
+        )  # fmt: skip
+        best, converged = found.value[found.best], bool(found.converged[found.best])
+    else:
 
-    best, converged = _least(
-        everything, 0 if task.goal is None else 3, starts, (lower, upper, scale), max_steps, progress
-    )
+        def everything(unit: Array) -> Array:
+            x = unit * scale
+            return jnp.concatenate([task.cost(x)[None], miss(x), -within(x)])
+
+        best, converged = _least(everything, starts, (lower, upper, scale), max_steps, progress)
     trajectory = task.build(jnp.asarray(best))
     trajectory = stretched(trajectory, minimum_stretch(task.robot, trajectory, task.motors))
     finer = jax.jit(lambda trajectory: orientation_along(robot, trajectory, jnp.zeros(3), 4 * _SAMPLES))
@@ -262,13 +269,12 @@ def _fastest(
 
 def _least(
     everything: Callable[[Array], Array],
-    equalities: int,
     starts: np.ndarray,
     box: tuple[np.ndarray, np.ndarray, np.ndarray],
     max_steps: int,
     progress: str | None,
 ) -> tuple[np.ndarray, bool]:
-    """Least first number of `everything` with the next `equalities` zero and the rest not negative (SciPy's SLSQP).
+    """Least first number of `everything` with the next three zero and the rest not negative (SciPy's SLSQP).
 
     One small program with all derivatives is compiled, where the batched solver of `design` would compile for minutes.
     """
@@ -289,9 +295,7 @@ def _least(
     def part(kind: str, rows: slice) -> dict[str, Any]:
         return {"type": kind, "fun": lambda x: at(x)[0][rows], "jac": lambda x: at(x)[1][rows]}
 
-    constraints = [part("ineq", slice(1 + equalities, None))]
-    if equalities:
-        constraints.append(part("eq", slice(1, 1 + equalities)))
+    constraints = [part("eq", slice(1, 4)), part("ineq", slice(4, None))]
     found = []
     total = max_steps * len(starts)
     with tqdm(total=total, desc=progress, unit="step", file=sys.stderr, disable=progress is None) as bar:
@@ -302,7 +306,7 @@ def _least(
                 options={"maxiter": max_steps, "ftol": 1e-7}, callback=lambda _: bar.update(1),
             )  # fmt: skip
             value = at(answer.x)[0]
-            off = max(np.abs(value[1 : 1 + equalities]).max(initial=0), -value[1 + equalities :].min(initial=0))
+            off = max(np.abs(value[1:4]).max(), -value[4:].min())
             found.append((not (answer.success and off < 1e-5), value[0] if off < 1e-4 else np.inf, answer.x * scale))
     failed, _, best = min(found, key=lambda item: item[:2])
     return best, not failed

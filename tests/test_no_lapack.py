@@ -16,6 +16,10 @@ CALLS = {
     "connection": lambda robot, path: reojax.connection(robot, path[0]),
     "angular_momentum": lambda robot, path: reojax.angular_momentum(robot, path[0], path[1], jnp.ones(3)),
     "curvature": lambda robot, path: reojax.curvature(robot, path[0]),
+    "inverse_dynamics": lambda robot, path: reojax.inverse_dynamics(robot, *path),
+    "forward_dynamics": lambda robot, path: reojax.forward_dynamics(robot, *path),
+    "simulate": lambda robot, path: reojax.simulate(robot, reojax.polygon(path), durations=1.0, samples=2),
+    "through": lambda robot, path: reojax.through(reojax.polygon(path), 1.0),
     "net_rotation": lambda robot, path: reojax.net_rotation(robot, reojax.polygon(path)),
     "rotation_history": lambda robot, path: reojax.rotation_history(robot, reojax.polygon(path), samples=3),
 }
