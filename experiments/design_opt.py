@@ -1,6 +1,6 @@
 """Which loop rolls the thesis's robot by exactly 180 degrees with least joint travel, and what do feet and gears trade?
 
-    python experiments/design_opt.py                # about a minute and a half on 2 idle cores, compilation included
+    python experiments/design_opt.py                # about three minutes on 2 cores, compilation included
     python experiments/design_opt.py --target 120 --quick
 
 First the prototype as it is, within 270/120: the best rectangle, polygon and smooth loop (spline) whose whole net

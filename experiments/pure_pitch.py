@@ -1,6 +1,6 @@
 """Which closed loop turns the prototype by 90 degrees about pitch, and nothing else, with the least joint travel?
 
-    python experiments/pure_pitch.py                # about a minute on 2 idle cores, compilation included
+    python experiments/pure_pitch.py                # a minute or two on 2 cores, compilation included
 
 No rectangle of the thesis gives it: manoeuvres A and B turn about roll and yaw. Polygons with five free corners, 64
 random starts, least joint travel subject to the whole net rotation being 90 degrees about x, within 270/120.

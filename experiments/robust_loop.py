@@ -1,6 +1,6 @@
 """Which loop turns the prototype by 180 degrees of roll and is least sensitive to errors of 5 % in every inertia?
 
-    python experiments/robust_loop.py               # about five minutes on 2 idle cores, compilation included
+    python experiments/robust_loop.py               # some minutes on 2 cores, compilation included
 
 Polygons with four free corners within 270/120. The plain optimum has least joint travel, the robust one least mean
 square turn of the result when the inertia of every link and of every rotor has an independent error of 5 %, with no

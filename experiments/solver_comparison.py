@@ -1,6 +1,6 @@
 """How does the solver of `reojax.design` compare with SciPy's, on the same problem with the same gradients?
 
-    python experiments/solver_comparison.py         # about three minutes on 2 idle cores, compilation included
+    python experiments/solver_comparison.py         # two to three minutes on 2 cores, compilation included
 
 The polygon of least joint travel, five free corners, that turns the prototype by exactly 180 degrees of roll within
 270/120 (`design_opt.py`), from the same 64 random starts: `design.optimise`, all at once; SciPy's SLSQP, start by

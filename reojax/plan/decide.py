@@ -5,7 +5,7 @@ near the target and are solved; what is found is solved again on the true rotati
 start succeeds, so "not with fewer" is a numerical decision, not a proof.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -18,6 +18,8 @@ LONGEST = 5
 """Longest word whose loops each have amplitudes of their own; longer words repeat loops."""
 _ROUNDS = ((0, 3), (3, 10), (10, 40))
 """Starts tried for each target, from and to in order of distance; each round where those before failed."""
+_LAST_ROUND = (40, 240)
+"""Further starts for what is not reached with the longest word that is allowed."""
 _HOPE = 0.1
 """Squared residual [rad^2] that some start must come down to for another round."""
 _FAR = {1: 0.06, 2: 0.1, 3: 0.15}
@@ -71,21 +73,31 @@ class Answer:
 def fewest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> Answer:
     """Words of the fewest loops, up to `most`, and of these of least travel, for targets (4, m)."""
     answer = Answer(scene, targets, tolerance)
-    for slots in range(1, min(most, LONGEST) + 1):
-        waiting = np.flatnonzero(~answer.solved)
-        starts = scene.library.near(targets[:, waiting], slots, _ROUNDS[-1][1])
-        closest = np.where(starts.distance[:, 0] < _FAR.get(slots, _FAR_LONG), 0.0, np.inf)
-        for first, last in _ROUNDS:
-            trying = np.flatnonzero(~answer.solved[waiting] & (closest < _HOPE))
-            some = Starts(*(field[..., trying, first:last] for field in starts))
-            found = attempt(scene, targets, starting_rows(waiting[trying], some))
-            closest[trying] = found.square.reshape(-1, last - first).min(1)
-            missed = found.take(found.square >= _CLOSE)
-            answer.offer(least(missed, missed.square))
-            _offer_solved(scene, targets, answer, found, keep=1)
+    longest = min(most, LONGEST)
+    for slots in range(1, longest + 1):
+        _with_loops(scene, targets, answer, slots, _ROUNDS)
+    if longest == LONGEST:
+        _with_loops(scene, targets, answer, longest, (_LAST_ROUND,))
     if most > LONGEST:
         _with_small_loops(scene, targets, most, answer, loops)
     return answer
+
+
+def _with_loops(
+    scene: Scene, targets: np.ndarray, answer: Answer, slots: int, rounds: Sequence[tuple[int, int]]
+) -> None:
+    """Try words of `slots` loops for what is not reached yet."""
+    waiting = np.flatnonzero(~answer.solved)
+    starts = scene.library.near(targets[:, waiting], slots, rounds[-1][1])
+    closest = np.where(starts.distance[:, 0] < _FAR.get(slots, _FAR_LONG), 0.0, np.inf)
+    for first, last in rounds:
+        trying = np.flatnonzero(~answer.solved[waiting] & (closest < _HOPE))
+        some = Starts(*(field[..., trying, first:last] for field in starts))
+        found = attempt(scene, targets, starting_rows(waiting[trying], some))
+        closest[trying] = found.square.reshape(-1, last - first).min(1)
+        missed = found.take(found.square >= _CLOSE)
+        answer.offer(least(missed, missed.square))
+        _offer_solved(scene, targets, answer, found, keep=1)
 
 
 def cheapest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> Answer:

@@ -21,8 +21,9 @@ _PATTERNS = ((0, 1, 0), (1, 0, 1), (0, 1, 0, 1), (1, 0, 1, 0), (0, 1, 0, 1, 0), 
 _SLOTS = 6
 _STARTS = 12
 """Splits tried for each pattern and target."""
-_KEPT = 6
-"""Splits of each target that are made whole."""
+_KEPT = 3
+"""Splits of each target and pattern that are made whole, from the fewest loops to the most: few loops may leave no
+room to make the numbers whole."""
 
 
 class Units(NamedTuple):
@@ -61,10 +62,11 @@ def grouped_rows(scene: Scene, targets: np.ndarray, owner: np.ndarray, most: int
     kind, numbers, who = _splits(one, targets[:, owner])
     rows = []
     for i in range(len(owner)):
-        mine = np.flatnonzero(who == i)
-        mine = mine[np.argsort(np.abs(numbers[:, mine]).sum(0))[:_KEPT]]
-        for split in mine:
-            rows.extend(_whole(one, kind[:, split], numbers[:, split], most, owner[i]))
+        for pattern in np.unique(kind[:, who == i], axis=1).T:
+            mine = np.flatnonzero((who == i) & (kind == pattern[:, None]).all(0))
+            mine = mine[np.argsort(np.abs(numbers[:, mine]).sum(0))]
+            for split in mine[np.unique(np.linspace(0, len(mine) - 1, _KEPT).astype(int))]:
+                rows.extend(_whole(one, kind[:, split], numbers[:, split], most, owner[i]))
     fields = [np.stack(field, axis=-1) for field in zip(*rows, strict=True)] if rows else _nothing(one)
     owners, letter, runs, x = fields
     return Rows(owners, letter, runs, x, np.full(len(rows), np.inf))
