@@ -26,9 +26,7 @@ def section(out: Path, *, quick: bool) -> dict[str, Any]:
         verdicts, least = _figure(out, name, body, path, joint)
         result[name] = {"least_s": least, "verdicts": dict(zip(map(str, STEPS), verdicts, strict=True))}
         said = "90 efficient, 80 over-used"
-        rows.append(
-            (f"figure 3.2, {name}: least time of the first step [ms]", "between 80 and 90", f"{1e3 * least:.1f}")
-        )
+        rows.append((f"figure 3.2, {name}: least time of step 1 [ms]", "between 80 and 90", f"{1e3 * least:.1f}"))
         rows.append((f"figure 3.2, {name}: 110, 100, 90, 80 ms", said, ", ".join(verdicts)))
     path = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
     times = {

@@ -1,14 +1,15 @@
 """What does the thesis's drop tower ask of robot, motors and controllers, and what would the cameras see?
 
-    python experiments/drop_tower.py --out out          # 2 to 3 minutes on 2 cores; --quick: no tuning, 1 minute
+    python experiments/drop_tower.py --out out          # 6 to 8 minutes on 2 cores; --quick: 1 to 2
 
-The whole story of thesis 1.8 in one run: the fall, the plan, joints under control in closed loop, an imperfect release,
-and a capture beside the simulation. Its sections are the modules `_drop_tower_*.py`. One table holds what the thesis
-measured or said against what comes out here; the capture is synthetic, and says so.
+The whole story of thesis 1.8 in one run: the fall, the plan, least times and figure 3.2, joints under control in closed
+loop, an imperfect release, and a capture beside the simulation. Its sections are the modules `_drop_tower_*.py`. One
+table holds what the thesis measured or said against what comes out here; the capture is synthetic, and says so.
 
-Expected: with a soft controller the joints lag by some 0.4 rad and the ZXZ angles differ on the way by 0.05 to 0.1 rad
-RMS, less than the thesis measured; the orientation ends within 0.1 rad of the planned one all the same, and within 0.01
-rad under tuned controllers, though the motors saturate.
+Expected: A fits into the fall with free time laws or overlapped edges, not as a rectangle of quintics. With a soft
+controller the joints lag by some 0.4 rad and the ZXZ angles differ on the way by 0.05 to 0.1 rad RMS, less than the
+thesis measured; the orientation ends within 0.1 rad of the planned one all the same, and within 0.01 rad under tuned
+controllers, though the motors saturate.
 """
 
 from pathlib import Path

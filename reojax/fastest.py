@@ -150,7 +150,7 @@ def fastest_loop(
     knots: int = 10,
     starts: int = 3,
     seed: int = 0,
-    max_steps: int = 120,
+    max_steps: int = 200,
     progress: str | None = None,
 ) -> Fastest:
     """The fastest closed motion with a given net rotation: a spline of free knots at free times, at rest at both ends.
@@ -303,7 +303,7 @@ def _least(
             answer = minimize(
                 lambda x: at(x)[0][0], start / scale, jac=lambda x: at(x)[1][0], method="SLSQP",
                 bounds=list(zip(lower / scale, upper / scale, strict=True)), constraints=constraints,
-                options={"maxiter": max_steps, "ftol": 1e-7}, callback=lambda _: bar.update(1),
+                options={"maxiter": max_steps, "ftol": 1e-6}, callback=lambda _: bar.update(1),
             )  # fmt: skip
             value = at(answer.x)[0]
             off = max(np.abs(value[1:4]).max(), -value[4:].min())
