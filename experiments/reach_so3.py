@@ -5,8 +5,8 @@
 
 Uniformly random targets (Haar), twist within 270 degrees and bend within 120: the prototype, the prototype with
 unequal end links and with a centre of mass out of the bending plane, and the six-body robot. Every plan is replayed
-by another integrator on the plain momentum equation, a few by Pinocchio and SciPy. Expected: every target reached
-to 1e-8 rad, with at most 5 manoeuvres of A and B.
+by another integrator on the plain momentum equation, a few by Pinocchio and SciPy. Expected: practically
+every target reached to 1e-8 rad, with at most 5 manoeuvres of A and B (docs/planning.md has a run's figures).
 """
 
 import time
