@@ -32,12 +32,17 @@ def dress(axes: Axes, edges: int) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(GREY)
     axes.tick_params(colors=INK, length=3, color=GREY)
+    legend_above(axes, columns=6)
+
+
+def legend_above(axes: Axes, *, columns: int) -> None:
+    """Put the legend above the axes, from the left, without a frame."""
     axes.legend(
         loc="lower left",
         bbox_to_anchor=(0, 1),
         borderaxespad=0.3,
         borderpad=0,
-        ncols=6,
+        ncols=columns,
         columnspacing=1.6,
         frameon=False,
         handlelength=2.2,

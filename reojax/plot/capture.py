@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reojax.comparison import Comparison
-from reojax.plot._style import GREY, INK, JOINTS, PALE
+from reojax.plot._style import GREY, INK, JOINTS, PALE, legend_above
 from reojax.robot import Robot
 
 _ANGLES = ("#d55e00", "#009e73", "#cc79a7")
@@ -70,18 +70,7 @@ def _draw(
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}".translate(_SIGN))
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}".translate(_SIGN))
     axes.margins(x=0)
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0, 1),
-        borderaxespad=0.3,
-        borderpad=0,
-        ncols=3,
-        columnspacing=1.6,
-        frameon=False,
-        handlelength=2.2,
-        fontsize=9.5,
-        labelcolor=INK,
-    )
+    legend_above(axes, columns=3)
 
 
 def _degrees(angle: float) -> str:
