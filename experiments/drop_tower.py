@@ -12,6 +12,7 @@ thesis measured; the orientation ends within 0.1 rad of the planned one all the 
 controllers, though the motors saturate.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -62,16 +63,20 @@ def the_plan() -> dict[str, Any]:
 
 
 def main(out: Path, *, quick: bool = False) -> dict[str, Any]:
-    """Run all sections; write `drop_tower.json` and pictures to `out`, and return the numbers."""
+    """Run all sections; write `drop_tower.json`, anew after each section, and pictures to `out`; return the numbers."""
     table = check_writable(out / "drop_tower.json")
-    sections = {
-        "fall": the_fall(),
-        "plan": the_plan(),
-        "time": _drop_tower_time.section(out, quick=quick),
-        "tracking": _drop_tower_tracking.section(out, quick=quick),
-        "release": _drop_tower_release.section(quick=quick),
-        "capture": _drop_tower_capture.section(out),
+    parts: dict[str, Callable[[], dict[str, Any]]] = {
+        "fall": the_fall,
+        "plan": the_plan,
+        "time": lambda: _drop_tower_time.section(out, quick=quick),
+        "tracking": lambda: _drop_tower_tracking.section(out, quick=quick),
+        "release": lambda: _drop_tower_release.section(quick=quick),
+        "capture": lambda: _drop_tower_capture.section(out),
     }
+    sections: dict[str, Any] = {}
+    for name, part in parts.items():
+        sections[name] = part()
+        write_json(table, sections)
     print(f"{'what':58}{'thesis':29}here")
     for section in sections.values():
         for what, said, found in section["rows"]:

@@ -3,7 +3,7 @@
 import json
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -29,6 +29,18 @@ def check_writable(path: str | os.PathLike[str]) -> Path:
         file.close()
         temporary.unlink()
     return target
+
+
+def check_ending(path: str | os.PathLike[str], kind: str, formats: Sequence[str]) -> Path:
+    """Return `path` if its name ends in one of `formats` and a file, a `kind`, can be written there now.
+
+    Raises:
+        ValueError: naming the path and the endings there are, or what stands in the way.
+    """
+    if Path(path).suffix[1:].lower() not in formats:
+        endings = ", ".join(f".{ending}" for ending in formats)
+        raise ValueError(f"cannot write {str(path)!r}: the name of a {kind} ends in one of {endings}.")
+    return check_writable(path)
 
 
 @contextmanager

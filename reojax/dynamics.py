@@ -156,9 +156,7 @@ def base_velocity(
 
     Arguments and errors as for `inverse_dynamics`.
     """
-    robot, theta, theta_dot, h = checked(robot, theta=theta, theta_dot=theta_dot, momentum=_or_zero(momentum))
-    A, B = matrices_at(robot, kinematics(robot, theta))
-    return solve_symmetric3(A, (B @ theta_dot + h)[:, None])[:, 0]
+    return _base(robot, theta, theta_dot, momentum)[-1]
 
 
 def kinetic_energy(
@@ -172,12 +170,19 @@ def kinetic_energy(
 
     Arguments and errors as for `inverse_dynamics`.
     """
+    robot, theta_dot, pose, A, B, omega = _base(robot, theta, theta_dot, momentum)
+    joints = theta_dot @ _fixed_inertia(robot, pose) @ theta_dot
+    return 0.5 * (omega @ (A @ omega) + joints) - omega @ (B @ theta_dot)
+
+
+def _base(
+    robot: Robot, theta: Any, theta_dot: Any, momentum: Any
+) -> tuple[Robot, Array, Kinematics, Array, Array, Array]:
+    """The checked robot and joint rates, the pose, `A`, `B`, and the base's angular velocity."""
     robot, theta, theta_dot, h = checked(robot, theta=theta, theta_dot=theta_dot, momentum=_or_zero(momentum))
     pose = kinematics(robot, theta)
     A, B = matrices_at(robot, pose)
-    omega = solve_symmetric3(A, (B @ theta_dot + h)[:, None])[:, 0]
-    joints = theta_dot @ _fixed_inertia(robot, pose) @ theta_dot
-    return 0.5 * (omega @ (A @ omega) + joints) - omega @ (B @ theta_dot)
+    return robot, theta_dot, pose, A, B, solve_symmetric3(A, (B @ theta_dot + h)[:, None])[:, 0]
 
 
 def _or_zero(momentum: Any) -> Any:

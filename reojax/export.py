@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._arrays import as_numbers
-from reojax._output import check_writable, replacing
+from reojax._output import check_ending, replacing
 from reojax.robot import Robot
 
 FORMATS = ("csv", "yaml", "yml", "json")
@@ -23,11 +23,7 @@ def check_trajectory(path: str | os.PathLike[str]) -> Path:
     Raises:
         ValueError: for an ending that is not in `FORMATS`, or a path that cannot be written.
     """
-    target = Path(path)
-    if target.suffix[1:].lower() not in FORMATS:
-        endings = ", ".join(f".{kind}" for kind in FORMATS)
-        raise ValueError(f"cannot write {str(path)!r}: the name of a trajectory ends in one of {endings}.")
-    return check_writable(path)
+    return check_ending(path, "trajectory", FORMATS)
 
 
 def write_trajectory(

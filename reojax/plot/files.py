@@ -5,7 +5,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from reojax._output import check_writable, replacing
+from reojax._output import check_ending, replacing
 
 FORMATS = ("png", "pdf", "svg")
 """Kinds of picture, by the ending of the file's name."""
@@ -17,11 +17,7 @@ def check_picture(path: str | os.PathLike[str]) -> Path:
     Raises:
         ValueError: for an ending that is not in `FORMATS`, or a path that cannot be written.
     """
-    target = Path(path)
-    if target.suffix[1:].lower() not in FORMATS:
-        endings = ", ".join(f".{kind}" for kind in FORMATS)
-        raise ValueError(f"cannot write {str(path)!r}: the name of a picture ends in one of {endings}.")
-    return check_writable(path)
+    return check_ending(path, "picture", FORMATS)
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
