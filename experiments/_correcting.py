@@ -12,7 +12,7 @@ from reojax._arrays import Array
 
 LIMITS = np.deg2rad([270.0, 120.0])
 """Of twist and bend."""
-_CHUNK = 512
+_CHUNK = 128
 _STEPS, _LONGEST = 16, 0.5
 """Gauss-Newton steps of a correction, and the longest change of an amplitude in one, as a share of its limit."""
 
@@ -73,7 +73,7 @@ def _in_chunks(function, robots, words: Words, used: np.ndarray):
 def rotations(robots, words: Words) -> np.ndarray:
     """Net rotation (m, s, 3, 3) of every manoeuvre."""
     turned = np.tile(np.eye(3), (*words.last.shape, 1, 1))
-    run, slot, found = _in_chunks(_turns, robots, words, words.x.any(-1))
+    run, slot, found = _in_chunks(_turns, robots, words, np.asarray((words.x != 0).any(axis=-1)))
     turned[run, slot] = found
     return turned
 
@@ -116,7 +116,7 @@ def correct(robots, words: Words, start: np.ndarray, target: np.ndarray, free: n
         rows = Words(words.last[going], x[going])
         turned = np.tile(np.eye(3), (*rows.last.shape, 1, 1))
         slopes = np.zeros((*rows.last.shape, 3, 2))
-        some = jax.tree.map(lambda leaf: leaf[going], robots)
+        some = jax.tree.map(lambda leaf, going=going: leaf[going], robots)
         run, slot, (turned_here, slopes_here) = _in_chunks(_slopes, some, rows, free[going])
         turned[run, slot], slopes[run, slot] = turned_here, slopes_here
         places = along(start[going], turned)

@@ -23,7 +23,7 @@ from reojax.holonomy import DEFAULT_STEPS, net_rotation
 from reojax.path import Path
 from reojax.robot import Robot
 
-_GAUSS_NEWTON = 10
+_GAUSS_NEWTON = 5
 """Most steps."""
 _SMALL = 1e-6
 """Gain of the last step, relative to 1, that counts as the end."""
@@ -93,7 +93,7 @@ def estimate(
             after = jnp.matmul(before, turn, precision="highest")
             return after, after
 
-        return jax.lax.scan(follow, start, turns)[1]
+        return jax.lax.scan(follow, start, jnp.asarray(turns))[1]
 
     def residual(z: Array) -> tuple[jax.Array, jax.Array]:
         misses = jax.vmap(lambda r, m: so3.log(r.T @ m))(predicted(z), measured)
