@@ -131,7 +131,7 @@ def read(table: Table, word: Array, x: Array) -> tuple[Array, Array]:
     strides = [int(np.prod(sizes[axis + 1 :])) for axis in range(d)]
     offsets = (near * np.array(strides)[:, None]).sum(0).astype(index.dtype).reshape(-1, *(1,) * index.ndim)
     # read once, not again for every sum
-    flat = table.coefficients.reshape(4, -1)
+    flat = jnp.asarray(table.coefficients).reshape(4, -1)
     values = flat.at[:, index[None] + offsets].get(mode="promise_in_bounds", wrap_negative_indices=False)
     values = jax.lax.optimization_barrier(values)
 
