@@ -131,9 +131,7 @@ def read(table: Table, word: Array, x: Array) -> tuple[Array, Array]:
     strides = [int(np.prod(sizes[axis + 1 :])) for axis in range(d)]
     offsets = (near * np.array(strides)[:, None]).sum(0).astype(index.dtype).reshape(-1, *(1,) * index.ndim)
     # read once, not again for every sum
-    flat = jnp.asarray(table.coefficients).reshape(4, -1)
-    values = flat.at[:, index[None] + offsets].get(mode="promise_in_bounds", wrap_negative_indices=False)
-    values = jax.lax.optimization_barrier(values)
+    values = jax.lax.optimization_barrier(table.coefficients.reshape(4, -1)[:, index[None] + offsets])
 
     def total(orders: Sequence[int]) -> Array:
         weight = bases[0][orders[0]][near[0]]
