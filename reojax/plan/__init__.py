@@ -13,6 +13,7 @@ from reojax.manoeuvres import Layout
 from reojax.plan import checks, quaternions
 from reojax.plan.attempts import Scene, joined, scene
 from reojax.plan.decide import cheapest, fewest, from_folded
+from reojax.plan.free import FreePaths as FreePaths, free_paths as free_paths
 from reojax.plan.result import Plan as Plan, first_of, plans
 from reojax.plan.words import VOCABULARIES, box_of
 from reojax.robot import Robot
