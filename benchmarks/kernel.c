@@ -7,7 +7,11 @@
 
 #include <math.h>
 
+#ifdef __AVX512F__
 enum { LANES = 8 };
+#else
+enum { LANES = 4 };
+#endif
 typedef double V __attribute__((vector_size(8 * LANES), aligned(8), may_alias));
 typedef struct { V x, y, z; } Vec;
 typedef struct { V xx, yy, zz, xy, xz, yz; } Sym;

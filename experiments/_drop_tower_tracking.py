@@ -17,7 +17,7 @@ from reojax.release import released
 FRICTION = 1e-4  # N m on the rotor; chosen, some 10 mA of no-load current
 SETTLE = 0.2  # s after the planned end
 SOFT = 40.0  # rad/s, chosen: joints that lag as much as one sees
-DURATIONS = (0.12, 0.19, 0.12, 0.19)  # s, of the four edges: 0.62 s, what the fall leaves
+DURATIONS = (0.12, 0.19, 0.12, 0.19)  # s, of the four edges: 0.62 s, 1.3 ms more than the fall leaves
 CONTROLLERS = {"PID": (False, PID_BANDWIDTH), "PID + torques": (True, FEEDFORWARD_BANDWIDTH)}
 CASES = {"soft PID": (False, SOFT)} | CONTROLLERS
 WORTH = 1.02  # the least bandwidth whose error is within this factor of the best is taken

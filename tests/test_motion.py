@@ -1,5 +1,7 @@
 """Motions by time: the law does not matter for the net rotation, the momentum stays, and MuJoCo moves alike."""
 
+import json
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +12,7 @@ from random_robots import random_robot
 import reojax
 from reojax import RE_MAX_17, so3
 from reojax.certificate import _derivative
+from reojax.cli import main
 from reojax.momentum import kinematics
 
 PROTOTYPE = reojax.robots.prototype()
@@ -231,3 +234,24 @@ def test_with_motors_gives_the_robot_the_motors_numbers():
     np.testing.assert_allclose(robot.rotor_inertia, 0.868e-7)
     with pytest.raises(ValueError, match=r"motors.gear_ratio is 0.0; it must be other than zero"):
         reojax.with_motors(PROTOTYPE, RE_MAX_17._replace(gear_ratio=0.0))
+
+
+def test_momentum_at_the_command_line(capsys):
+    """It is the library's motion; a spin that the steps do not resolve is refused, as is one without a time."""
+    command = ["simulate", "--json", "--duration", "0.8"]
+    assert main([*command, "--momentum=-0.001,0,0.002"]) == 0
+    motion = json.loads(capsys.readouterr().out)["motion"]
+    path = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
+    angles = np.abs(np.diff(path.waypoints, axis=0)).max(axis=1)
+    durations = 0.8 * angles / angles.sum()
+    same = reojax.simulate(PROTOTYPE, path, durations=durations, momentum=(-0.001, 0, 0.002))
+    np.testing.assert_allclose(motion["rotation_vector_deg"], np.rad2deg(reojax.so3.log(same.rotation[-1])), atol=1e-7)
+    for arguments, message in (
+        ([*command, "--momentum", "0,0,1e6"], "too fast to be resolved"),
+        (["simulate", "--momentum", "0,0,1"], "needs a --duration"),
+        ([*command, "--momentum", "0,nan,1"], "is not three finite numbers"),
+    ):
+        assert main(arguments) == 2
+        error = capsys.readouterr().err
+        assert message in error
+        assert error.count("\n") == 1

@@ -20,7 +20,7 @@ from ._task import Loops, Task
 
 SOURCE = Path(__file__).resolve().parents[1] / "kernel.c"
 FLAGS = ("-O3", "-march=native", "-fopenmp-simd")
-LANES = 8  # of kernel.c
+LANES = 8  # most of kernel.c
 FORMS = {"net_rotation": "any axes", "net_rotation_prototype": "this robot only"}
 
 

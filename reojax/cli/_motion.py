@@ -1,6 +1,7 @@
 """What `reojax simulate` adds when a duration is given: the manoeuvre by time, and what it takes of the motors."""
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._motors import motor_at
@@ -14,10 +15,12 @@ LAW = "quintic"
 """The law where only a duration is given."""
 RPM = 9.549296585513721
 """Turns per minute in one rad/s."""
+_RESOLVED = 1e-4
+"""Largest change of the last orientation with twice the step for which a spin counts as resolved."""
 
 
 def check_law(args: argparse.Namespace) -> None:
-    """Refuse a time law that there is none of, or that has no time.
+    """Refuse a time law that there is none of, and a time law or a momentum that has no time.
 
     Raises:
         ValueError: saying so.
@@ -28,17 +31,19 @@ def check_law(args: argparse.Namespace) -> None:
         by_name(args.law)
         if args.duration is None:
             raise ValueError("argument --law: a time law needs a --duration")
+    if args.momentum is not None and args.duration is None:
+        raise ValueError("argument --momentum: how far a spin turns needs a --duration")
 
 
 def motion_of(robot: "Robot", path: "Path", args: argparse.Namespace) -> "Motion | None":
     """The manoeuvre by time, if a duration is given.
 
     Raises:
-        ValueError: if nothing moves, or the motors do not fit the robot.
+        ValueError: if nothing moves, the motors do not fit the robot, or it spins too fast for the samples.
     """
     import numpy as np
 
-    from reojax.motion import simulate
+    from reojax.motion import DEFAULT_SAMPLES, simulate
 
     if args.duration is None:
         return None
@@ -46,7 +51,25 @@ def motion_of(robot: "Robot", path: "Path", args: argparse.Namespace) -> "Motion
     if not angles.sum() > 0:
         raise ValueError("nothing moves: every edge of the manoeuvre stays put.")
     durations = args.duration * angles / angles.sum()
-    return simulate(robot, path, args.law or LAW, durations=durations, motors=motor_at(args.supply))
+    run = partial(
+        simulate,
+        robot,
+        path,
+        args.law or LAW,
+        durations=durations,
+        motors=motor_at(args.supply),
+        momentum=args.momentum,
+    )
+    motion = run()
+    if args.momentum is not None:
+        coarse = run(samples=DEFAULT_SAMPLES // 2)
+        change = float(np.abs(np.asarray(motion.rotation[-1] - coarse.rotation[-1])).max())
+        if not change < _RESOLVED:
+            raise ValueError(
+                f"argument --momentum: {args.momentum} kg m^2/s for {args.duration:g} s spins too fast to be resolved "
+                f"(halving the step changes the orientation by {change:.1g})"
+            )
+    return motion
 
 
 def motion_report(robot: "Robot", motion: "Motion", args: argparse.Namespace) -> dict[str, Any]:
@@ -63,6 +86,7 @@ def motion_report(robot: "Robot", motion: "Motion", args: argparse.Namespace) ->
         "law": args.law or LAW,
         "duration_s": float(motion.time[-1]),
         "supply_V": args.supply,
+        "momentum_kg_m2_s": args.momentum or [0.0, 0.0, 0.0],
         "rotation_vector_deg": np.rad2deg(np.asarray(so3.log(motion.rotation[-1]))).tolist(),
         "joints": list(robot.joint_names),
         "peak_rate_rad_s": peaks(motion.theta_dot),
@@ -87,5 +111,9 @@ def motion_text(motion: dict[str, Any]) -> list[str]:
         rate, torque, speed, current, margin = (motion[column][k] for column in columns)
         cells = f"{rate:>9.2f} rad/s{torque:>9.4f} N m{speed * RPM:>9.0f} rpm{current:>9.3f} A{margin:>9.3f}"
         lines.append(f"  {name:<8}{cells} at {1000 * motion['least_margin_at_s'][k]:.0f} ms")
+    if any(motion["momentum_kg_m2_s"]):
+        turned = ", ".join(f"{x:.4f}" for x in motion["rotation_vector_deg"])
+        spin = ", ".join(f"{x:g}" for x in motion["momentum_kg_m2_s"])
+        lines.append(f"  released with angular momentum {spin} kg m^2/s, it turns by ({turned}) deg, not as above")
     verdict = "the motors can do it" if motion["possible"] else "beyond the motors: a margin is negative"
     return [*lines, f"  {verdict} (margin: share of the supply that is left where it is least)"]

@@ -29,6 +29,17 @@ def seconds(text: str) -> float:
     return _positive(text, "a duration in seconds", LONGEST)
 
 
+def momentum(text: str) -> list[float]:
+    """Read an angular momentum, three numbers between commas (an argparse type)."""
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+        raise argparse.ArgumentTypeError(f"{text!r} is not three finite numbers X,Y,Z")
+    return numbers
+
+
 def motor_at(supply: float) -> "Motor":
     """The prototype's motor at a supply [V]."""
     from reojax.motor import RE_MAX_17

@@ -8,6 +8,7 @@ so a word of hundreds of equal loops costs what one loop costs.
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float, Int
 
@@ -50,7 +51,7 @@ def miss(table: Table, word: Word, x: Float[Array, "d k m"]) -> Miss:
 
 def chained(word: Word, q: Float[Array, "4 k m"], dq: Float[Array, "d 4 k m"]) -> Miss:
     """Put the loops' quaternions and their derivatives together."""
-    q, dq = _powers(word.runs, q, dq)
+    q, dq = jax.lax.optimization_barrier(_powers(word.runs, q, dq))  # once, not again for every product
     slots = q.shape[1]
     before = [inverse(tuple(word.target))]
     for i in range(slots):
@@ -62,7 +63,8 @@ def chained(word: Word, q: Float[Array, "4 k m"], dq: Float[Array, "d 4 k m"]) -
     w, *v = before.pop()
     sign = jnp.where(w < 0, -2.0, 2.0).astype(w.dtype)
     residual = sign[None] * jnp.stack(v)
-    changes = product(product(_slots(before), tuple(dq[:, i] for i in range(4))), _slots(after[::-1]))
+    left, right = jax.lax.optimization_barrier((_slots(before), _slots(after[::-1])))
+    changes = product(product(left, tuple(dq[:, i] for i in range(4))), right)
     jacobian = sign[None, None, None] * jnp.stack(changes[1:], axis=2)
     return Miss(residual, jacobian, (residual * residual).sum(0))
 

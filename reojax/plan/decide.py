@@ -27,6 +27,10 @@ _FAR = {1: 0.06, 2: 0.1, 3: 0.15}
 _FAR_LONG = 0.25
 _CLOSE = 1e-9
 """Squared residual on the table [rad^2] from which the true rotations are tried."""
+_CLOSE_FEW = {1: 1e-5, 2: 1e-6}
+"""The same for words of so few loops that they barely reach a target or do not, which the table cannot tell apart."""
+_NEAR, _PATIENCE = 1e-4, 6
+"""Squared residual on the table up to which such words are tried on, and how often."""
 _EXACT = 1e-13
 """Squared residual on the table that leaves no doubt."""
 _AGAIN = 4
@@ -90,14 +94,27 @@ def _with_loops(
     waiting = np.flatnonzero(~answer.solved)
     starts = scene.library.near(targets[:, waiting], slots, rounds[-1][1])
     closest = np.where(starts.distance[:, 0] < _FAR.get(slots, _FAR_LONG), 0.0, np.inf)
+    close = _CLOSE_FEW.get(slots, _CLOSE)
     for first, last in rounds:
         trying = np.flatnonzero(~answer.solved[waiting] & (closest < _HOPE))
         some = Starts(*(field[..., trying, first:last] for field in starts))
         found = attempt(scene, targets, starting_rows(waiting[trying], some))
+        if slots in _CLOSE_FEW:
+            found = _continued(scene, targets, found)
         closest[trying] = found.square.reshape(-1, last - first).min(1)
-        missed = found.take(found.square >= _CLOSE)
+        missed = found.take(found.square >= close)
         answer.offer(least(missed, missed.square))
-        _offer_solved(scene, targets, answer, found, keep=1)
+        _offer_solved(scene, targets, answer, found.take(found.square < close), keep=1)
+
+
+def _continued(scene: Scene, targets: np.ndarray, found: Rows) -> Rows:
+    """Go on with what comes near a target slowly, as words do that barely reach it."""
+    found = found._replace(x=found.x.copy(), square=found.square.copy())
+    for _ in range(_PATIENCE):
+        near = np.flatnonzero((found.square > _EXACT) & (found.square < _NEAR))
+        then = attempt(scene, targets, found.take(near))
+        found.x[..., near], found.square[near] = then.x, then.square
+    return found
 
 
 def cheapest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> Answer:
@@ -111,7 +128,7 @@ def cheapest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> 
         found = attempt(scene, targets, least(rows, value, _LEAST_TRAVEL))
         missed = found.take(found.square >= _CLOSE)
         answer.offer(least(missed, missed.square))
-        _offer_solved(scene, targets, answer, found, keep=4)
+        _offer_solved(scene, targets, answer, found.take(found.square < _CLOSE), keep=4)
     if most > LONGEST:
         _with_small_loops(scene, targets, most, answer, lambda rows: travel(scene.box, rows))
     return answer
@@ -135,7 +152,6 @@ def _with_small_loops(
 
 def _offer_solved(scene: Scene, targets: np.ndarray, answer: Answer, found: Rows, keep: int) -> None:
     """Shorten what reaches the target on the table, and solve it on the true rotations."""
-    found = found.take(found.square < _CLOSE)
     value = travel(scene.box, found) + np.where(found.square > _EXACT, 1e3, 0.0)
     short = shortened(scene, targets, least(found, value, keep))
     answer.offer(settle(scene, targets, least(short, travel(scene.box, short)), answer.tolerance))

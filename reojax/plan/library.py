@@ -42,7 +42,7 @@ class Library:
         small = rng.random(x.shape) < 0.1
         small[1] = False
         x = np.where(small, x * 10.0 ** -rng.uniform(0, 3, x.shape), x)
-        self._rng, self._letter, self._x = rng, letter, x
+        self._letter, self._x = letter, x
         self._q = np.asarray(_read(table, letter, x)[0])
         self._words = {}
 
@@ -58,10 +58,15 @@ class Library:
 
         if slots not in self._words:
             everything = np.arange(len(self._letter))[None]
-            index = everything if slots == 1 else self._rng.integers(len(self._letter), size=(slots, _WORDS))
+            index = everything if slots == 1 else _of_length(slots, len(self._letter))
             q = self._q[:, index[0]]
             for row in index[1:]:
                 q = np.stack(quaternions.product(q, self._q[:, row]))
             q = q / np.sqrt((q * q).sum(0))
             self._words[slots] = index, KDTree(np.concatenate([q, -q], axis=1).T)
         return self._words[slots]
+
+
+def _of_length(slots: int, loops: int) -> np.ndarray:
+    """Loops (slots, words) of random words; the same whatever was asked for before."""
+    return np.random.default_rng(slots).integers(loops, size=(slots, _WORDS))
