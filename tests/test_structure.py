@@ -41,6 +41,7 @@ LAYERS = [
     ["design.certainty"],
     ["design"],
     ["plan.quaternions", "plan.words", "plan.checks"],
+    ["plan.closed"],
     ["plan.free"],
     ["plan.loops"],
     ["plan.chain", "plan.library"],
