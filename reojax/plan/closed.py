@@ -7,7 +7,6 @@ on an edge; while searching it is rounded off, `|d|` of an edge becoming `sqrt(d
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 import jax
@@ -25,9 +24,9 @@ from reojax.plan.checks import key_of
 from reojax.plan.words import Box, folded
 from reojax.robot import Robot
 
-COARSE, FINE = 2, 16
+COARSE, FINE = 2, 8
 """Steps per edge while searching, and when judging."""
-_RANDOM = 16384
+_RANDOM = 8192
 """Random polygons that starts are taken from."""
 _CALL = 64
 """Polygons whose rotations are computed together."""
@@ -43,8 +42,8 @@ class Polygons(NamedTuple):
 
     paths: Callable[[np.ndarray], np.ndarray]
     """Whole joint paths (m, v, j), both ends at zero, of polygons (m, n)."""
-    rotations: Callable[[np.ndarray, int], np.ndarray]
-    """Net rotations (m, 3, 3) of polygons (m, n), by a number of steps."""
+    rotations: Callable[[np.ndarray], np.ndarray]
+    """Net rotations (m, 3, 3) of polygons (m, n), by `FINE` steps."""
     travel: Callable[[Array, Any], Array]
     """Joint travel, rounded off; takes (x, (target, r)), as does `miss`."""
     miss: Callable[[Array, Any], Array]
@@ -114,13 +113,11 @@ def _polygons_of(robot: Robot, layout: Layout, corners: int) -> Polygons:
     def miss(x: Array, data: Any) -> Array:
         return so3.log(data[0].T @ net_rotation(robot, path(x), steps=COARSE))
 
-    @partial(jax.jit, static_argnums=1)
-    def turned(x: Array, steps: int) -> Array:
-        return jax.vmap(lambda x: net_rotation(robot, path(x), steps=steps))(x)
+    turned = jax.jit(jax.vmap(lambda x: net_rotation(robot, path(x), steps=FINE)))
 
-    def rotations(x: np.ndarray, steps: int) -> np.ndarray:
+    def rotations(x: np.ndarray) -> np.ndarray:
         calls = [np.arange(i, i + _CALL) for i in range(0, len(x), _CALL)]
-        found = [np.asarray(turned(x[np.minimum(call, len(x) - 1)], steps), float) for call in calls]
+        found = [np.asarray(turned(x[np.minimum(call, len(x) - 1)]), float) for call in calls]
         return np.concatenate(found)[: len(x)] if found else np.zeros((0, 3, 3))
 
     return Polygons(paths, rotations, travel, miss)
@@ -128,7 +125,7 @@ def _polygons_of(robot: Robot, layout: Layout, corners: int) -> Polygons:
 
 def _library(polygons: Polygons, low: np.ndarray, high: np.ndarray, corners: int, seed: int) -> Library:
     x = _random(np.random.default_rng(seed), low, high, corners).reshape(_RANDOM, -1)
-    turns = quaternions.from_matrices(polygons.rotations(x, COARSE))
+    turns = quaternions.from_matrices(polygons.rotations(x))
     lengths = np.abs(np.diff(polygons.paths(x), axis=1)).sum((1, 2))
     return Library(np.tile(low, corners), np.tile(high, corners), x, turns, lengths)
 

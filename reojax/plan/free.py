@@ -17,7 +17,7 @@ from reojax._arrays import Array
 from reojax.design.solver import optimise
 from reojax.manoeuvres import Layout
 from reojax.plan import checks, quaternions
-from reojax.plan.closed import COARSE, FINE, Library, Polygons, family_of
+from reojax.plan.closed import Library, Polygons, family_of
 from reojax.plan.words import box_of
 from reojax.robot import Robot
 
@@ -118,7 +118,7 @@ def free_paths(
     with _bar(progress) as bar:
         solver = _Solver(polygons, library, min(_ROWS, len(wanted) * starts), exact, bar)
         x = _shortest(solver, _first(solver, wanted, starts, max_steps), wanted, max_steps, tolerance)
-    paths, rotation = polygons.paths(x), polygons.rotations(x, FINE)
+    paths, rotation = polygons.paths(x), polygons.rotations(x)
     still = _apart(np.eye(3), wanted) <= tolerance
     paths[still], rotation[still] = 0.0, np.eye(3)
     error = _apart(rotation, wanted)
@@ -180,17 +180,20 @@ def _shortest(solver: _Solver, found: np.ndarray, targets: np.ndarray, max_steps
     """The best polygon (m, n) of some for each target, once they are improved to the end."""
     polygons, shape = solver.polygons, found.shape[:2]
     wanted = np.repeat(targets, shape[1], axis=0)
-    x = found.reshape(len(wanted), -1)
-    error = _apart(polygons.rotations(x, FINE), wanted)
+    x, aim = found.reshape(len(wanted), -1), wanted.copy()
+    turned = polygons.rotations(x)
+    error = _apart(turned, wanted)
     for k in range(_LAST + 1):
-        near = (error > 0.1 * tolerance) & (error < _NEAR * solver.exact)
-        going = np.flatnonzero(near) if k else np.arange(len(x))
-        coarse, fine = polygons.rotations(x[going], COARSE), polygons.rotations(x[going], FINE)
-        aim = wanted[going] @ fine.swapaxes(1, 2) @ coarse
-        moved, _, _ = solver(x[going], aim, _SHARP, _LAST_STEPS if k else max_steps)
-        now = _apart(polygons.rotations(moved, FINE), wanted[going])
-        better = now < np.maximum(error[going], 0.0 if k else _REACHED * solver.exact)
-        x[going[better]], error[going[better]] = moved[better], now[better]
+        near = error < _NEAR * solver.exact
+        going = np.flatnonzero(near & (error > 0.1 * tolerance)) if k else np.arange(len(x))
+        shift = wanted[going] @ turned[going].swapaxes(1, 2)
+        new = np.where(near[going, None, None], shift @ aim[going], wanted[going])
+        moved, _, _ = solver(x[going], new, _SHARP, _LAST_STEPS if k else max_steps)
+        now = polygons.rotations(moved)
+        off = _apart(now, wanted[going])
+        better = off < np.maximum(error[going], 0.0 if k else _REACHED * solver.exact)
+        for old, change in ((x, moved), (aim, new), (turned, now), (error, off)):
+            old[going[better]] = change[better]
     paths = polygons.paths(x)
     worth = _worth(error, np.abs(np.diff(paths, axis=1)).sum((1, 2)), tolerance).reshape(shape)
     return np.take_along_axis(x.reshape(*shape, -1), worth.argmin(1)[:, None, None], 1)[:, 0]
