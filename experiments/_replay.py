@@ -45,30 +45,31 @@ def base_rate(robot: reojax.Robot, theta: np.ndarray, rate: np.ndarray) -> np.nd
     """Angular velocity (3, n) of the base for joint angles and rates (j, n), nothing having momentum at first."""
     nowhere = np.zeros((3, theta.shape[1]))
     turned, origin, spin, speed = [np.tile(np.eye(3)[:, :, None], theta.shape[1])], [nowhere], [nowhere], [nowhere]
-    momentum, inertia = nowhere, 0.0
+    momentum, inertia = nowhere, 0 * turned[0]
+    axes, anchors = np.asarray(robot.axis), np.asarray(robot.anchor)
     for k, parent in enumerate(robot.parent):
-        axis = robot.axis[k] / np.linalg.norm(robot.axis[k])
+        axis = axes[k] / np.linalg.norm(axes[k])
         once = _hat(axis).T @ turned[parent]
-        arm, hinge = robot.anchor[k] @ turned[parent], axis @ turned[parent]
+        arm, hinge = anchors[k] @ turned[parent], axis @ turned[parent]
         turned.append(turned[parent] + np.sin(theta[k]) * once + (1 - np.cos(theta[k])) * (_hat(axis).T @ once))
         origin.append(origin[parent] + arm)
         spin.append(spin[parent] + hinge * rate[k])
         speed.append(speed[parent] + _cross(spin[parent], arm))
         turns = robot.gear_ratio[k] * (1 if robot.rotor_on[k] == "parent" else -1)
         momentum = momentum + robot.rotor_inertia[k] * turns * rate[k] * hinge
-    lever = [com @ r for com, r in zip(robot.com, turned, strict=True)]
-    share = robot.mass / robot.mass.sum()
-    middle = sum(m * (o + at) for m, o, at in zip(share, origin, lever, strict=True))
-    for i, mass in enumerate(robot.mass):
+    masses, inertias = np.asarray(robot.mass), np.asarray(robot.inertia)
+    lever = [com @ r for com, r in zip(np.asarray(robot.com), turned, strict=True)]
+    middle = np.einsum("i,ian->an", masses / masses.sum(), np.array(origin) + np.array(lever))
+    for i, mass in enumerate(masses):
         from_middle, moving = origin[i] + lever[i] - middle, speed[i] + _cross(spin[i], lever[i])
-        half = robot.inertia[i] @ turned[i]
-        own = sum(half[:, None, c] * turned[i][None, :, c] for c in range(3))
-        momentum = momentum + sum(own[:, c] * spin[i][c] for c in range(3)) + mass * _cross(from_middle, moving)
+        half = inertias[i] @ turned[i]
+        own = np.einsum("acn,dcn->adn", half, turned[i])
+        momentum = momentum + np.einsum("acn,cn->an", own, spin[i]) + mass * _cross(from_middle, moving)
         inertia = inertia + own - mass * from_middle[:, None] * from_middle[None]
         inertia = inertia + mass * (from_middle**2).sum(0) * np.eye(3)[:, :, None]
     a, b, c = inertia
-    columns = _cross(b, c), _cross(c, a), _cross(a, b)
-    return -sum(column * h for column, h in zip(columns, momentum, strict=True)) / (a * columns[0]).sum(0)
+    x, y, z = _cross(b, c), _cross(c, a), _cross(a, b)
+    return -(x * momentum[0] + y * momentum[1] + z * momentum[2]) / (a * x).sum(0)
 
 
 def _hat(v: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ loops (docs/planning.md has a run's figures).
 """
 
 import time
+from collections.abc import Sequence
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -96,20 +97,21 @@ def small_loops(count: int) -> dict:
     seconds = time.perf_counter() - start
     error = apart(replay(robot, plan.waypoints), targets)
     names = [*(f"quarter turn, {name}" for name in quarters), *(f"random {m + 1}" for m in range(count))]
-    columns = {
-        "target": names,
-        "loops": plan.manoeuvres.tolist(),
-        "word": [_grouped(word) for word in plan.word],
-        "travel_deg": np.rad2deg(plan.travel).tolist(),
-        "error_rad": plan.error.tolist(),
-        "replayed_error_rad": error.tolist(),
-    }
-    reached = plan.converged & (error <= ENOUGH)
-    targets_of_table = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    return {"targets": targets_of_table, "seconds": seconds, "reached": int(reached.sum())}
+    rows = [
+        {
+            "target": name,
+            "loops": int(plan.manoeuvres[m]),
+            "word": _grouped(plan.word[m]),
+            "travel_deg": float(np.rad2deg(plan.travel[m])),
+            "error_rad": float(plan.error[m]),
+            "replayed_error_rad": float(error[m]),
+        }
+        for m, name in enumerate(names)
+    ]
+    return {"targets": rows, "seconds": seconds, "reached": int((plan.converged & (error <= ENOUGH)).sum())}
 
 
-def _grouped(word: np.ndarray) -> str:
+def _grouped(word: Sequence[str]) -> str:
     """The word with equal neighbours counted: A^30 B^12."""
     runs = groupby(name for name in word if name)
     return " ".join(f"{name}^{len(list(run))}" for name, run in runs)
@@ -174,8 +176,9 @@ def draw(rows: list[dict]) -> Figure:
         low, middle, high = row["travel_deg"][:3]
         right.errorbar([k], [middle], [[middle - low], [high - middle]], fmt="o", color=colours[k], capsize=5)
     left.set(xlabel="manoeuvres needed", ylabel="random targets [%]", title="How many manoeuvres")
+    left.margins(y=0.4)  # room for the legend
     left.legend(fontsize=8, frameon=False, loc="upper left")
-    right.set_xticks(range(len(rows)), [row["robot"].replace(" of mass", "\nof mass") for row in rows], fontsize=8)
+    right.set_xticks(range(len(rows)), [row["robot"].replace(" out of", "\nout of") for row in rows], fontsize=8)
     right.set(ylabel="joint travel [deg]", title="Joint travel: median, 5 % to 95 %", ylim=(0, None))
     right.margins(x=0.2)
     return figure
