@@ -41,6 +41,8 @@ LAYERS = [
     ["design.certainty"],
     ["design"],
     ["plan.quaternions", "plan.words", "plan.checks"],
+    ["plan.closed"],
+    ["plan.free"],
     ["plan.loops"],
     ["plan.chain", "plan.library"],
     ["plan.search"],
