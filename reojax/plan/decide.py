@@ -92,12 +92,14 @@ def _with_loops(
 ) -> None:
     """Try words of `slots` loops for what is not reached yet."""
     waiting = np.flatnonzero(~answer.solved)
-    starts = scene.library.near(targets[:, waiting], slots, rounds[-1][1])
-    closest = np.where(starts.distance[:, 0] < _FAR.get(slots, _FAR_LONG), 0.0, np.inf)
+    closest = np.zeros(len(waiting))
     close = _CLOSE_FEW.get(slots, _CLOSE)
     for first, last in rounds:
         trying = np.flatnonzero(~answer.solved[waiting] & (closest < _HOPE))
-        some = Starts(*(field[..., trying, first:last] for field in starts))
+        starts = scene.library.near(targets[:, waiting[trying]], slots, last)
+        near = starts.distance[:, 0] < _FAR.get(slots, _FAR_LONG)
+        closest[trying[~near]] = np.inf
+        trying, some = trying[near], Starts(*(field[..., near, first:last] for field in starts))
         found = attempt(scene, targets, starting_rows(waiting[trying], some))
         if slots in _CLOSE_FEW:
             found = _continued(scene, targets, found)

@@ -51,7 +51,8 @@ class Library:
         index, tree = self._of(slots)
         distance, nearest = tree.query(target.T, k=count, workers=-1)
         nearest = np.reshape(nearest, (-1, count)) % index.shape[1]
-        return Starts(self._letter[index][:, nearest], self._x[:, index][:, :, nearest], distance.reshape(-1, count))
+        loops = index[:, nearest]
+        return Starts(self._letter[loops], self._x[:, loops], distance.reshape(-1, count))
 
     def _of(self, slots: int):
         from scipy.spatial import KDTree
