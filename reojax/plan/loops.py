@@ -24,7 +24,7 @@ from reojax.plan import quaternions
 from reojax.plan.words import Box, folded, last_twist, loop_corners
 from reojax.robot import Robot
 
-_CHUNK = 256
+_CHUNK = 128
 """Loops per call: one program for any number of them."""
 _LONGEST_EDGE = 4.8
 """Largest change of a joint angle on an edge for which the default steps are meant [rad]."""
