@@ -5,16 +5,20 @@
 
 Uniformly random targets (Haar), twist within 270 degrees and bend within 120: the prototype, the prototype with
 unequal end links and with a centre of mass out of the bending plane, and the six-body robot. Every plan is replayed
-by another integrator on the plain momentum equation, a few by Pinocchio and SciPy. Expected: practically
-every target reached to 1e-8 rad, with at most 5 manoeuvres of A and B (docs/planning.md has a run's figures).
+by another integrator on momenta summed link by link, a few by Pinocchio and SciPy. Then the prototype with twist and
+bend within 20 degrees, and up to 2000 loops: quarter turns about roll, pitch and yaw, and random targets.
+Expected: practically every target reached to 1e-8 rad, with at most 5 manoeuvres of A and B, or hundreds of small
+loops (docs/planning.md has a run's figures).
 """
 
 import time
+from collections.abc import Sequence
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
-from _replay import apart, magnus, pinocchio
+from _replay import apart, pinocchio, replay
 from _script import options, run
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
@@ -24,6 +28,7 @@ from reojax import robots
 from reojax._output import check_writable, write_json
 
 LIMITS = {"twist_limit": np.deg2rad(270), "bend_limit": np.deg2rad(120), "max_manoeuvres": 5}
+SMALL = {"twist_limit": np.deg2rad(20), "bend_limit": np.deg2rad(20), "max_manoeuvres": 2000}
 ENOUGH = 1e-8
 """Error [rad] that counts as reached when replayed."""
 
@@ -45,7 +50,7 @@ def out_of_plane() -> reojax.Robot:
     return robot.replace(com=com)
 
 
-def reach(name: str, robot: reojax.Robot, count: int, seed: int, replayed: int, checked: int) -> dict:
+def reach(name: str, robot: reojax.Robot, count: int, seed: int, checked: int) -> dict:
     """Plan for random targets and replay; everything measured, as plain numbers."""
     targets = Rotation.from_quat(np.random.default_rng(seed).normal(size=(count, 4))).as_matrix()
     find = partial(reojax.plan_many, robot, **LIMITS)
@@ -53,8 +58,7 @@ def reach(name: str, robot: reojax.Robot, count: int, seed: int, replayed: int, 
     start = time.perf_counter()
     plan = find(targets, progress=True)
     seconds = time.perf_counter() - start
-    some = slice(0, replayed or count)
-    error = apart(magnus(robot, plan.waypoints[some], progress="replay"), targets[some])
+    error = apart(replay(robot, plan.waypoints, progress="replay"), targets)
     other = []
     for m in range(checked):
         try:
@@ -65,7 +69,6 @@ def reach(name: str, robot: reojax.Robot, count: int, seed: int, replayed: int, 
         "robot": name,
         "targets": count,
         "reached": int(plan.converged.sum()),
-        "replayed": len(error),
         "replayed_within": int((error <= ENOUGH).sum()),
         "largest_error_rad": float(plan.error.max()),
         "largest_replayed_error_rad": float(error.max()),
@@ -81,7 +84,40 @@ def reach(name: str, robot: reojax.Robot, count: int, seed: int, replayed: int, 
     }
 
 
-def main(out: Path, *, quick: bool = False, replay: int = 0) -> dict:
+def small_loops(count: int) -> dict:
+    """Quarter turns about each axis and `count` random targets within small limits; everything measured."""
+    robot = robots.prototype()
+    quarters = dict(zip(("pitch", "yaw", "roll"), np.eye(3) * np.pi / 2, strict=True))
+    random = Rotation.from_quat(np.random.default_rng(0).normal(size=(count, 4))).as_rotvec()
+    targets = Rotation.from_rotvec([*quarters.values(), *random]).as_matrix()
+    find = partial(reojax.plan_many, robot, **SMALL)
+    find(targets[:1])  # compile, and tabulate the robot's loops
+    start = time.perf_counter()
+    plan = find(targets)
+    seconds = time.perf_counter() - start
+    error = apart(replay(robot, plan.waypoints), targets)
+    names = [*(f"quarter turn, {name}" for name in quarters), *(f"random {m + 1}" for m in range(count))]
+    rows = [
+        {
+            "target": name,
+            "loops": int(plan.manoeuvres[m]),
+            "word": _grouped(plan.word[m]),
+            "travel_deg": float(np.rad2deg(plan.travel[m])),
+            "error_rad": float(plan.error[m]),
+            "replayed_error_rad": float(error[m]),
+        }
+        for m, name in enumerate(names)
+    ]
+    return {"targets": rows, "seconds": seconds, "reached": int((plan.converged & (error <= ENOUGH)).sum())}
+
+
+def _grouped(word: Sequence[str]) -> str:
+    """The word with equal neighbours counted: A^30 B^12."""
+    runs = groupby(name for name in word if name)
+    return " ".join(f"{name}^{len(list(run))}" for name, run in runs)
+
+
+def main(out: Path, *, quick: bool = False) -> dict:
     """Plan, replay, print the table, write `reach_so3.json` and `reach_so3.png` to `out`, and return the numbers."""
     table, picture = check_writable(out / "reach_so3.json"), check_writable(out / "reach_so3.png")
     sizes = (48, 0, 0, 16) if quick else (10_000, 1_000, 1_000, 1_000)
@@ -95,7 +131,7 @@ def main(out: Path, *, quick: bool = False, replay: int = 0) -> dict:
     rows = []
     for seed, ((name, make), size) in enumerate(zip(makers.items(), sizes, strict=True)):
         if size:
-            rows.append(reach(name, make(), size, seed, replay, checked))
+            rows.append(reach(name, make(), size, seed, checked))
             write_json(table, {"rows": rows})
     print(f"{'robot':30}{'targets':>8}{'reached':>8}{'replayed to':>12}{'Pinocchio':>11}  manoeuvres 1 2 3 4 5  "
           f"{'travel median, most':>20}{'per second':>12}")  # fmt: skip
@@ -107,14 +143,22 @@ def main(out: Path, *, quick: bool = False, replay: int = 0) -> dict:
             f"{'-' if by is None else f'{by:.1e}':>11}  {counts:21}"
             f"{row['travel_deg'][1]:9.0f}, {row['travel_deg'][3]:.0f} deg{row['targets_per_second']:12.0f}"
         )
-    answer = {"rows": rows, "converged": all(map(_whole, rows))}
+    small = small_loops(1 if quick else 20)
+    print(f"\ntwist and bend within 20 degrees, up to {SMALL['max_manoeuvres']} loops: {small['reached']} of "
+          f"{len(small['targets'])} reached, in {small['seconds']:.1f} s")  # fmt: skip
+    print(f"{'target':22}{'loops':>6}{'travel [deg]':>14}{'error':>9}{'replayed to':>13}  word")
+    for row in small["targets"]:
+        print(f"{row['target']:22}{row['loops']:6}{row['travel_deg']:14.0f}{row['error_rad']:9.1e}"
+              f"{row['replayed_error_rad']:13.1e}  {row['word']}")  # fmt: skip
+    whole = all(map(_whole, rows)) and small["reached"] == len(small["targets"])
+    answer = {"rows": rows, "small_loops": small, "converged": whole}
     write_json(table, answer)
     draw(rows).savefig(picture, dpi=130)
     return answer
 
 
 def _whole(row: dict) -> bool:
-    return row["reached"] == row["targets"] and row["replayed_within"] == row["replayed"]
+    return row["reached"] == row["targets"] and row["replayed_within"] == row["targets"]
 
 
 def draw(rows: list[dict]) -> Figure:
@@ -132,14 +176,13 @@ def draw(rows: list[dict]) -> Figure:
         low, middle, high = row["travel_deg"][:3]
         right.errorbar([k], [middle], [[middle - low], [high - middle]], fmt="o", color=colours[k], capsize=5)
     left.set(xlabel="manoeuvres needed", ylabel="random targets [%]", title="How many manoeuvres")
+    left.margins(y=0.4)  # room for the legend
     left.legend(fontsize=8, frameon=False, loc="upper left")
-    right.set_xticks(range(len(rows)), [row["robot"].replace(" of mass", "\nof mass") for row in rows], fontsize=8)
+    right.set_xticks(range(len(rows)), [row["robot"].replace(" out of", "\nout of") for row in rows], fontsize=8)
     right.set(ylabel="joint travel [deg]", title="Joint travel: median, 5 % to 95 %", ylim=(0, None))
     right.margins(x=0.2)
     return figure
 
 
 if __name__ == "__main__":
-    parser = options(__doc__)
-    parser.add_argument("--replay", type=int, default=0, metavar="N", help="replay the first N of each (default: all)")
-    run(main, parser)
+    run(main, options(__doc__))
