@@ -176,15 +176,17 @@ def _spread(
     def end(release: Array) -> Array:
         return _integrated(length, nodes, release)[0][-1]
 
-    rotation = end(mean)
-
-    def error(release: Array) -> Array:
-        return so3.log(jnp.matmul(rotation.T, end(release), precision="highest"))
-
-    sensitivity = jax.jacfwd(error)(mean)
+    # one program for everything: the expected release by each of its numbers, and the draws by none
+    random = deviation[None] * jax.random.normal(key, (draws, mean.size), mean.dtype)
+    along = jnp.concatenate([jnp.eye(mean.size, dtype=mean.dtype), jnp.zeros_like(random)])
+    start = mean[None] + jnp.concatenate([jnp.zeros((mean.size, mean.size), mean.dtype), random])
+    ends, slopes = jax.vmap(lambda release, by: jax.jvp(end, (release,), (by,)))(start, along)
+    rotation = ends[0]
+    back = partial(jnp.matmul, rotation.T, precision="highest")
+    sensitivity = jax.vmap(lambda slope: so3.vee(back(slope)))(slopes[: mean.size]).T
     scaled = sensitivity * deviation[None]
     covariance = jnp.matmul(scaled, scaled.T, precision="highest")
-    drawn = jax.vmap(error)(mean[None] + deviation[None] * jax.random.normal(key, (draws, mean.size), mean.dtype))
+    drawn = jax.vmap(lambda turned: so3.log(back(turned)))(ends[mean.size :])
     return ReleaseSpread(
         rotation=rotation,
         sensitivity=sensitivity,
@@ -220,27 +222,28 @@ def _nodes(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Arr
 def _integrated(length: Array, nodes: _Node, release: Array) -> tuple[Array, Array]:
     """Rotations (m, 3, 3) and momenta (m, 3): Runge-Kutta of order four on the rotation vector of each step."""
     momentum, pull, tied, drag = release[:3], release[3:6], release[6:9], release[9]
-    no_turn = jnp.zeros_like(momentum)
+    still = jnp.zeros_like(momentum)
+    parts, weights = jnp.array([0, 0.5, 0.5, 1], momentum.dtype), jnp.array([1, 2, 2, 1], momentum.dtype) / 6
+    nodes = jax.tree.map(lambda leaf: leaf[:, np.array([0, 1, 1, 2])], nodes)
 
     def step(state: tuple[Array, Array], inputs: tuple[Array, _Node]) -> tuple[tuple[Array, Array], tuple]:
         start, momentum = state
         h, node = inputs
 
-        def slope(turn: Array, momentum: Array, k: int) -> tuple[Array, Array]:
+        def stage(carry: tuple, inputs: tuple[Array, Array, _Node]) -> tuple[tuple, None]:
+            turn_rate, moment, turn_sum, moment_sum = carry
+            part, weight, node = inputs
+            turn = h * part * turn_rate
             rotation = jnp.matmul(start, so3.exp(turn), precision="highest")
-            omega = node.own[k] + node.mobility[k] @ (rotation.T @ momentum)
-            moment = jnp.cross(rotation @ (tied - node.middle[k]), pull) - drag * (rotation @ omega)
+            omega = node.own + node.mobility @ (rotation.T @ (momentum + h * part * moment))
+            moment = jnp.cross(rotation @ (tied - node.middle), pull) - drag * (rotation @ omega)
             twist = jnp.cross(turn, omega)
-            return omega + twist / 2 + jnp.cross(turn, twist) / 12, moment
+            turn_rate = omega + twist / 2 + jnp.cross(turn, twist) / 12
+            return (turn_rate, moment, turn_sum + weight * turn_rate, moment_sum + weight * moment), None
 
-        turn_1, moment_1 = slope(no_turn, momentum, 0)
-        turn_2, moment_2 = slope(h / 2 * turn_1, momentum + h / 2 * moment_1, 1)
-        turn_3, moment_3 = slope(h / 2 * turn_2, momentum + h / 2 * moment_2, 1)
-        turn_4, moment_4 = slope(h * turn_3, momentum + h * moment_3, 2)
-        turn = h / 6 * (turn_1 + 2 * turn_2 + 2 * turn_3 + turn_4)
-        momentum = momentum + h / 6 * (moment_1 + 2 * moment_2 + 2 * moment_3 + moment_4)
-        end = jnp.matmul(start, so3.exp(turn), precision="highest")
-        return (end, momentum), (end, momentum)
+        (*_, turn, moment), _ = jax.lax.scan(stage, (still,) * 4, (parts, weights, node))  # one stage to compile
+        end = jnp.matmul(start, so3.exp(h * turn), precision="highest"), momentum + h * moment
+        return end, end
 
     first = jnp.eye(3, dtype=momentum.dtype)
     _, (rotations, momenta) = jax.lax.scan(step, (first, momentum), (length, nodes))

@@ -1,4 +1,4 @@
-"""Overlapped edges: faster than one after the other, with the same net rotation, and no motor beyond its curve."""
+"""Fastest motions: faster than edge by edge, with the net rotation wanted, motors and joints within their limits."""
 
 import numpy as np
 import pytest
@@ -10,17 +10,41 @@ PROTOTYPE = reojax.robots.prototype()
 A = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
 
 
+def padded(trajectory, pieces=12):
+    """The same motion with further pieces that take no time, so that all are run by one program."""
+    still = np.zeros((pieces - trajectory.pieces, *trajectory.coefficients.shape[1:]))
+    breaks = np.append(trajectory.breaks, np.full(len(still), trajectory.duration))
+    return reojax.Trajectory(breaks, np.concatenate([trajectory.coefficients, still]))
+
+
+def check(found, target):
+    """Of a motion run by other means: its net rotation, motors, joints, ends."""
+    assert found.converged
+    assert found.error < 1e-9
+    assert found.beyond == 0
+    motion = reojax.simulate(PROTOTYPE, padded(found.trajectory), motors=RE_MAX_17, samples=64)
+    assert so3.angle(motion.rotation[-1].T @ target) < 1e-8
+    assert -1e-4 < np.asarray(motion.margin).min() < 2e-3
+    assert (np.asarray(motion.theta) <= PROTOTYPE.upper).all()
+    assert (np.asarray(motion.theta) >= PROTOTYPE.lower).all()
+    for end in (0, 64 * found.trajectory.pieces):
+        np.testing.assert_allclose(motion.theta[end], 0, atol=1e-9)
+        np.testing.assert_allclose(motion.theta_dot[end], 0, atol=1e-7)
+    np.testing.assert_allclose(motion.time[-1], found.duration)
+
+
 def test_overlapped_edges_are_faster_and_turn_as_far():
     found = reojax.overlap(PROTOTYPE, A, RE_MAX_17)
-    least = reojax.minimum_time(PROTOTYPE, A, RE_MAX_17)
-    assert found.converged
-    assert found.duration < 0.85 * least.duration
-    motion = reojax.simulate(PROTOTYPE, found.trajectory, motors=RE_MAX_17, samples=32)
-    assert so3.angle(motion.rotation[-1].T @ reojax.net_rotation(PROTOTYPE, A)) < 1e-4
-    assert np.asarray(motion.margin).min() > -1e-4
-    np.testing.assert_allclose(motion.theta[-1], 0, atol=1e-9)
-    np.testing.assert_allclose(motion.time[-1], found.duration)
-    assert found.beyond < 1e-6
+    check(found, reojax.net_rotation(PROTOTYPE, A))
+    assert found.duration < 0.85 * reojax.minimum_time(PROTOTYPE, A, RE_MAX_17).duration
+
+
+def test_the_fastest_loop_with_a_rotation_of_its_own():
+    """A half turn, which the path it starts from is not, in less time, joints up to their limits."""
+    target = so3.exp([0.0, 0.0, np.pi])
+    found = reojax.fastest_loop(PROTOTYPE, target, RE_MAX_17, A, knots=5, starts=1)
+    check(found, target)
+    assert found.duration < 0.85 * reojax.minimum_time(PROTOTYPE, A, RE_MAX_17).duration
 
 
 @pytest.mark.parametrize("target", [np.zeros((3, 3)), np.eye(2), np.diag([1.0, 1.0, -1.0])])

@@ -4,7 +4,6 @@ from collections import OrderedDict
 from typing import Any
 
 import jax
-import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
@@ -13,6 +12,7 @@ from reojax.manoeuvres import Layout
 from reojax.plan import checks, quaternions
 from reojax.plan.attempts import Scene, joined, scene
 from reojax.plan.decide import cheapest, fewest, from_folded
+from reojax.plan.free import FreePaths as FreePaths, free_path as free_path, free_paths as free_paths
 from reojax.plan.result import Plan as Plan, first_of, plans
 from reojax.plan.words import VOCABULARIES, box_of
 from reojax.robot import Robot
@@ -118,9 +118,7 @@ def replan(robot: Robot, target: ArrayLike, measured: ArrayLike, **options: Any)
 
 def _scene(robot: Robot, layout: Layout, letters: str, twist_limit: float, bend_limit: float) -> Scene:
     """Compute what plans of one robot within one box share, or find it among the last few."""
-    leaves, structure = jax.tree.flatten(robot)
-    key = (structure, *(np.asarray(leaf).tobytes() for leaf in leaves), layout, letters, twist_limit, bend_limit)
-    key = (*key, jax.dtypes.canonicalize_dtype(float))
+    key = (checks.key_of(robot), layout, letters, twist_limit, bend_limit, jax.dtypes.canonicalize_dtype(float))
     if key not in _scenes:
         _scenes[key] = scene(robot, layout, box_of(robot, layout, letters, twist_limit, bend_limit))
         if len(_scenes) > _KEPT:

@@ -1,7 +1,9 @@
 """The door of planning: targets, limits and choices checked, or a `ValueError`."""
 
+from collections.abc import Hashable
 from typing import Any
 
+import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -50,10 +52,11 @@ def positive(entry: str, value: Any, unit: str = "rad") -> float:
     return float(number)
 
 
-def whole(entry: str, value: Any) -> int:
-    """Return one positive integer."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise ValueError(f"`{entry}` is {value!r}; it must be a positive integer.")
+def whole(entry: str, value: Any, least: int = 1) -> int:
+    """Return one integer, at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        rule = "a positive integer" if least == 1 else f"an integer, at least {least}"
+        raise ValueError(f"`{entry}` is {value!r}; it must be {rule}.")
     return int(value)
 
 
@@ -62,6 +65,12 @@ def one_of(entry: str, value: Any, choices: tuple[str, ...]) -> str:
     if value not in choices:
         raise ValueError(f"`{entry}` is {value!r}; it must be one of {', '.join(map(repr, choices))}.")
     return value
+
+
+def key_of(robot: Robot) -> Hashable:
+    """Return what a robot is, down to the last bit, as a key to keep things under."""
+    leaves, structure = jax.tree.flatten(robot)
+    return structure, *(np.asarray(leaf).tobytes() for leaf in leaves)
 
 
 def robot_and_layout(robot: Any, layout: Layout | None) -> Layout:
