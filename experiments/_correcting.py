@@ -1,4 +1,8 @@
-"""Words of manoeuvres A and B for many runs at once, each with a robot of its own: rotations, slopes, corrections."""
+"""Words of A and B for many runs at once, each with a robot of its own: rotations, estimates, corrections.
+
+What a manoeuvre turns is differentiated once, by the errors of the robot's inertias and by the amplitudes: the first
+for the estimate, the second for the correction.
+"""
 
 from typing import NamedTuple
 
@@ -8,13 +12,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import reojax
-from reojax._arrays import Array
+from reojax import robots, so3
 
 LIMITS = np.deg2rad([270.0, 120.0])
 """Of twist and bend."""
+SPREAD = 0.1
+"""Standard deviation of the logarithm of an inertia."""
+NOMINAL = robots.prototype()
+LINKS = NOMINAL.mass.shape[0]
 _CHUNK = 128
 _STEPS, _LONGEST = 16, 0.5
 """Gauss-Newton steps of a correction, and the longest change of an amplitude in one, as a share of its limit."""
+_ESTIMATING = 3
+"""Gauss-Newton steps of an estimate."""
 
 
 class Words(NamedTuple):
@@ -25,112 +35,114 @@ class Words(NamedTuple):
     x: np.ndarray
     """(m, s, 2) twist and bend [rad]."""
 
-
-def corners_of(last: Array, x: Array) -> jax.Array:
-    """Corners (5, 3) of one manoeuvre."""
-    twist, bend = x[0], x[1]
-    rest = jnp.zeros_like(twist)
-    rows = [(rest, rest, rest), (rest, bend, rest), (twist, bend, last * twist), (twist, rest, last * twist),
-            (rest, rest, rest)]  # fmt: skip
-    return jnp.stack([jnp.stack(row) for row in rows])
+    @property
+    def used(self) -> np.ndarray:
+        """(m, s) which slots are used."""
+        return (self.x != 0).any(axis=-1)
 
 
-@jax.jit
-def legs(last, x):
-    """Corners (m, s, 5, 3) of all manoeuvres."""
-    return jax.vmap(jax.vmap(corners_of))(last, x)
+class Turns(NamedTuple):
+    """What the manoeuvres of words do."""
+
+    rotation: np.ndarray
+    """(m, s, 3, 3) net rotations."""
+    by_robot: np.ndarray
+    """(m, s, 3, links) turn of the end, base frame, by the errors of the inertias in standard deviations."""
+    by_x: np.ndarray
+    """(m, s, 3, 2) the same by twist and bend."""
 
 
-def _turn(robot, last, x):
-    rotation = reojax.net_rotation(robot, reojax.Path(corners_of(last, x)))
+def _turn(z, last, x):
+    robot = NOMINAL.replace(inertia=NOMINAL.inertia * jnp.exp(SPREAD * z)[:, None, None])
+    a, b = reojax.manoeuvre_a(x[0], x[1]), reojax.manoeuvre_b(x[0], x[1])
+    rotation = reojax.net_rotation(robot, reojax.Path(jnp.where(last < 0, a.waypoints, b.waypoints)))
     return rotation, rotation
 
 
 @jax.jit
-def _turns(robots, last, x):
-    return jax.vmap(lambda robot, last, x: _turn(robot, last, x)[0])(robots, last, x)
+@jax.vmap
+def _turn_and_slopes(z, last, x):
+    slopes, rotation = jax.jacfwd(_turn, argnums=(0, 2), has_aux=True)(z, last, x)
+    spin = jax.vmap(lambda slope: so3.vee(rotation.T @ slope), in_axes=2, out_axes=1)
+    return rotation, *map(spin, slopes)
 
 
-@jax.jit
-def _slopes(robots, last, x):
-    slopes, turned = jax.vmap(jax.jacfwd(_turn, argnums=2, has_aux=True))(robots, last, x)
-    spin = jnp.einsum("mai,majd->mijd", turned, slopes)
-    return turned, jnp.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+def turns(z: np.ndarray, words: Words) -> Turns:
+    """What words (m) do on robots whose inertias are off by `z` (m, links) standard deviations."""
+    m, s = words.last.shape
+    found = Turns(np.tile(np.eye(3), (m, s, 1, 1)), np.zeros((m, s, 3, LINKS)), np.zeros((m, s, 3, 2)))
+    run, slot = np.nonzero(words.used)
+    for first in range(0, len(run), _CHUNK):
+        take = np.minimum(np.arange(first, first + _CHUNK), len(run) - 1)
+        i, j = run[take], slot[take]
+        for field, value in zip(found, _turn_and_slopes(z[i], words.last[i, j], words.x[i, j]), strict=True):
+            field[i, j] = value
+    return found
 
 
-def _in_chunks(function, robots, words: Words, used: np.ndarray):
-    """A function of robots (c,), last (c,) and amplitudes (c, 2) for the used slots, robots[m] for all slots of m."""
-    run, slot = np.nonzero(used)
-    parts = []
-    for first in range(0, max(len(run), 1), _CHUNK):
-        i, j = (np.resize(part[first : first + _CHUNK], _CHUNK) if len(run) else np.zeros(_CHUNK, int)
-                for part in (run, slot))  # fmt: skip
-        robot = jax.tree.map(lambda leaf, i=i: leaf[i], robots)
-        parts.append(jax.tree.map(np.asarray, function(robot, words.last[i, j], words.x[i, j])))
-    return run, slot, jax.tree.map(lambda *part: np.concatenate(part)[: len(run)], *parts)
-
-
-def rotations(robots, words: Words) -> np.ndarray:
-    """Net rotation (m, s, 3, 3) of every manoeuvre."""
-    turned = np.tile(np.eye(3), (*words.last.shape, 1, 1))
-    run, slot, found = _in_chunks(_turns, robots, words, np.asarray((words.x != 0).any(axis=-1)))
-    turned[run, slot] = found
-    return turned
-
-
-def along(start: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Orientations (m, s + 1, 3, 3) before and after each of the turns (m, s, 3, 3)."""
+def along(start: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    """Orientations (m, s + 1, 3, 3) before and after each of the rotations (m, s, 3, 3)."""
     places = [start]
-    for slot in range(turns.shape[1]):
-        places.append(places[-1] @ turns[:, slot])
+    for slot in range(rotations.shape[1]):
+        places.append(places[-1] @ rotations[:, slot])
     return np.stack(places, axis=1)
 
 
 def angle_left(now: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Rotation vectors (m, 3) from where it is to the target, base frame."""
-    return Rotation.from_matrix(now.swapaxes(-1, -2) @ target).as_rotvec()
+    """Rotation vectors (..., 3) from where it is to the target, base frame."""
+    left = now.swapaxes(-1, -2) @ target
+    return Rotation.from_matrix(left.reshape(-1, 3, 3)).as_rotvec().reshape(left.shape[:-1])
 
 
-class Corrected(NamedTuple):
-    """Words with new amplitudes."""
+def estimate(words: Words, measured: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray]:
+    """Most probable errors of the inertias (m, links), and orientations (m, 3, 3) at the end, from all readings.
 
-    words: Words
-    error: np.ndarray
-    """(m,) angle left on the robots that the correction was made for [rad]."""
+    With z the errors in standard deviations, R_k(z) the orientation predicted after manoeuvre k and M_k (m, s, 3, 3)
+    the one measured there, `|z|^2 + sum_k |log(R_k(z)^T M_k)|^2 / noise^2` is made least by Gauss-Newton steps. The
+    orientation is then R(z): early readings sharpen it, as every turn depends on the same numbers.
+    """
+    z = np.zeros((len(measured), LINKS))
+    start = np.tile(np.eye(3), (len(measured), 1, 1))
+    for _ in range(_ESTIMATING):
+        found = turns(z, words)
+        effect, slopes = np.zeros((len(z), 3, LINKS)), []
+        for slot in range(words.last.shape[1]):
+            effect = found.rotation[:, slot].swapaxes(1, 2) @ effect + found.by_robot[:, slot]
+            slopes.append(effect)
+        slope = np.stack(slopes, axis=1) * (words.used[..., None, None] / noise)
+        miss = angle_left(along(start, found.rotation)[:, 1:], measured) / noise
+        normal = np.eye(LINKS) + np.einsum("mkan,mkap->mnp", slope, slope)
+        z = z + np.linalg.solve(normal, (np.einsum("mkan,mka->mn", slope, miss) - z)[..., None])[..., 0]
+    return z, along(start, turns(z, words).rotation)[:, -1]
 
 
-def correct(robots, words: Words, start: np.ndarray, target: np.ndarray, free: np.ndarray) -> Corrected:
-    """Least changes of the free manoeuvres' amplitudes, by Gauss-Newton steps, that end on the targets.
+def correct(z: np.ndarray, words: Words, start: np.ndarray, target: np.ndarray) -> Words:
+    """Words with the least changes of their amplitudes, by Gauss-Newton steps, that end on the targets.
 
     Args:
-        robots: (m,) robots on which the words are to end on the targets.
+        z: (m, links) robots on which the words are to end on the targets.
         words: where the amplitudes start.
-        start: (m, 3, 3) orientations before the free manoeuvres.
+        start: (m, 3, 3) orientations before the words.
         target: (m, 3, 3) orientations to end in.
-        free: (m, s) manoeuvres still to come; the others are left out.
     """
     x = words.x.copy()
     best, least = x.copy(), np.full(len(x), np.inf)
     going = np.arange(len(x))
     for _ in range(_STEPS):
         rows = Words(words.last[going], x[going])
-        turned = np.tile(np.eye(3), (*rows.last.shape, 1, 1))
-        slopes = np.zeros((*rows.last.shape, 3, 2))
-        some = jax.tree.map(lambda leaf, going=going: leaf[going], robots)
-        run, slot, (turned_here, slopes_here) = _in_chunks(_slopes, some, rows, free[going])
-        turned[run, slot], slopes[run, slot] = turned_here, slopes_here
-        places = along(start[going], turned)
+        found = turns(z[going], rows)
+        places = along(start[going], found.rotation)
         miss = angle_left(places[:, -1], target[going])
         length = np.linalg.norm(miss, axis=1)
         better = length < least[going]
         best[going[better]], least[going[better]] = rows.x[better], length[better]
         after = places[:, -1].swapaxes(-1, -2)[:, None] @ places[:, 1:]
-        jacobian = np.einsum("msab,msbd->masd", after, slopes) * LIMITS
-        x[going] = _moved(rows.x / LIMITS, jacobian, miss, free[going]) * LIMITS
+        jacobian = np.einsum("msab,msbd->masd", after, found.by_x) * LIMITS
+        x[going] = _moved(rows.x / LIMITS, jacobian, miss, words.used[going]) * LIMITS
         going = going[length > 1e-9]
         if not len(going):
             break
-    return Corrected(words._replace(x=best), least)
+    return words._replace(x=best)
 
 
 def _moved(share: np.ndarray, jacobian: np.ndarray, miss: np.ndarray, free: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from reojax._session import start
+from reojax._session import compile_quickly, start
 
 
 def options(doc: str | None) -> argparse.ArgumentParser:
@@ -25,6 +25,8 @@ def options(doc: str | None) -> argparse.ArgumentParser:
 def run(main: Callable[..., dict], parser: argparse.ArgumentParser) -> None:
     """Call `main(out, quick=..., **other options)`; exit 1 if its answer says `converged: False`, 2 on bad input."""
     arguments = vars(parser.parse_args())
+    if arguments["quick"]:
+        compile_quickly()
     start()
     try:
         out = arguments.pop("out")

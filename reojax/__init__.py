@@ -38,7 +38,15 @@ from reojax.momentum import (
 from reojax.motion import Motion as Motion, simulate as simulate
 from reojax.motor import RE_MAX_17 as RE_MAX_17, Motor as Motor, with_motors as with_motors
 from reojax.path import Path as Path, joint_travel as joint_travel, polygon as polygon
-from reojax.plan import Plan as Plan, plan as plan, plan_many as plan_many, replan as replan
+from reojax.plan import (
+    FreePaths as FreePaths,
+    Plan as Plan,
+    free_path as free_path,
+    free_paths as free_paths,
+    plan as plan,
+    plan_many as plan_many,
+    replan as replan,
+)
 from reojax.release import (
     Release as Release,
     Released as Released,

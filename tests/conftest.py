@@ -1,7 +1,10 @@
-"""A hostile test environment: strict shapes and dtypes, NaN is an error, float64 on."""
+"""A hostile test environment: strict shapes and dtypes, NaN is an error, float64 on; and a quick compiler."""
 
 import jax
 
+from reojax._session import compile_quickly
+
+compile_quickly()
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_debug_nans", True)

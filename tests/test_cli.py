@@ -261,3 +261,12 @@ def test_the_cache_forgets_its_oldest_programs(tmp_path):
         os.utime(tmp_path / name, (1e9 - age, 1e9 - age))
     _session._trim(tmp_path, 200)
     assert sorted(os.listdir(tmp_path)) == ["new", "old"]
+
+
+def test_compiling_quickly_leaves_given_flags_alone(monkeypatch):
+    monkeypatch.setenv("XLA_FLAGS", "--xla_force_host_platform_device_count=2")
+    _session.compile_quickly()
+    assert os.environ["XLA_FLAGS"] == "--xla_force_host_platform_device_count=2"
+    monkeypatch.delenv("XLA_FLAGS")
+    _session.compile_quickly()
+    assert "--xla_backend_optimization_level=0" in os.environ["XLA_FLAGS"].split()

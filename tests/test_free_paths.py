@@ -7,8 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import reojax
-from reojax import robots
-from reojax.plan import FreePaths, free_path, free_paths
+from reojax import FreePaths, free_path, free_paths, robots
 
 LIMITS = {"twist_limit": float(np.deg2rad(270)), "bend_limit": float(np.deg2rad(120))}
 FEW = {"corners": 5, "starts": 2, "max_steps": 60}

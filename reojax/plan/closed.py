@@ -26,8 +26,8 @@ from reojax.robot import Robot
 
 COARSE, FINE = 2, 8
 """Steps per edge while searching, and when judging."""
-_RANDOM = 8192
-"""Random polygons that starts are taken from."""
+_RANDOM = 4096
+"""Random polygons of either kind that starts are taken from."""
 _CALL = 64
 """Polygons whose rotations are computed together."""
 _PRICE = 60.0
@@ -51,7 +51,7 @@ class Polygons(NamedTuple):
 
 
 class Library(NamedTuple):
-    """Random polygons within one box."""
+    """Random polygons within one box: the first half of any kind, the others words of rectangles."""
 
     low: Float[np.ndarray, " n"]
     high: Float[np.ndarray, " n"]
@@ -62,9 +62,10 @@ class Library(NamedTuple):
     """Their joint travel [rad]."""
 
     def near(self, target: Float[np.ndarray, "3 3"], count: int) -> Float[np.ndarray, "c n"]:
-        """Those which end near a target with little travel, the most promising first."""
+        """Those which end near a target with little travel, the most promising first, of either kind in turn."""
         away = quaternions.angles(quaternions.product(quaternions.from_matrices(target[None]), self.turns))
-        return self.x[np.argsort(self.lengths + _PRICE * away)[:count]]
+        order = np.argsort((self.lengths + _PRICE * away).reshape(2, _RANDOM), axis=1) + [[0], [_RANDOM]]
+        return self.x[order.T.ravel()[:count]]
 
 
 _polygons: OrderedDict[Hashable, Polygons] = OrderedDict()
@@ -124,18 +125,31 @@ def _polygons_of(robot: Robot, layout: Layout, corners: int) -> Polygons:
 
 
 def _library(polygons: Polygons, low: np.ndarray, high: np.ndarray, corners: int, seed: int) -> Library:
-    x = _random(np.random.default_rng(seed), low, high, corners).reshape(_RANDOM, -1)
-    turns = quaternions.from_matrices(polygons.rotations(x))
+    rng = np.random.default_rng(seed)
+    kinds = np.concatenate([_anyhow(rng, low, high, corners), _words(rng, low, high, corners)])
+    size = np.where(rng.random(len(kinds)) < 0.5, 1.0, 10.0 ** rng.uniform(-3, 0, len(kinds)))
+    x = (kinds * size[:, None, None]).reshape(len(kinds), -1)
     lengths = np.abs(np.diff(polygons.paths(x), axis=1)).sum((1, 2))
+    turns = quaternions.from_matrices(polygons.rotations(x))
     return Library(np.tile(low, corners), np.tile(high, corners), x, turns, lengths)
 
 
-def _random(rng: np.random.Generator, low: np.ndarray, high: np.ndarray, corners: int) -> np.ndarray:
-    """Random polygons (k, corners, 3) on each edge of which every joint rests or moves, half of them smaller."""
+def _anyhow(rng: np.random.Generator, low: np.ndarray, high: np.ndarray, corners: int) -> np.ndarray:
+    """Random polygons (k, corners, 3) on each edge of which every joint rests or moves."""
     moves = rng.random((corners, _RANDOM, 3)) < 0.5
     angles = rng.uniform(low, high, moves.shape)
     points = [np.zeros((_RANDOM, 3))]
     for moving, angle in zip(moves, angles, strict=True):
         points.append(np.where(moving, angle, points[-1]))
-    size = np.where(rng.random(_RANDOM) < 0.5, 1.0, 10.0 ** rng.uniform(-3, 0, _RANDOM))
-    return np.stack(points[1:], axis=1) * size[:, None, None]
+    return np.stack(points[1:], axis=1)
+
+
+def _words(rng: np.random.Generator, low: np.ndarray, high: np.ndarray, corners: int) -> np.ndarray:
+    """Rectangles (k, corners, 3) of random amplitudes one after another, as many as there are corners for."""
+    loops = (corners + 1) // 4
+    if not loops:
+        return _anyhow(rng, low, high, corners)
+    bend, twist = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 1.0])
+    shape = np.stack([bend, bend + twist, twist, np.zeros(3)])
+    points = (shape * rng.uniform(low, high, (_RANDOM, loops, 1, 3))).reshape(_RANDOM, -1, 3)
+    return np.pad(points, ((0, 0), (0, 1), (0, 0)))[:, np.minimum(np.arange(corners), 4 * loops)]

@@ -72,7 +72,7 @@ def free_paths(
     twist_limit: float,
     bend_limit: float,
     corners: int = 8,
-    starts: int = 4,
+    starts: int = 8,
     layout: Layout | None = None,
     tolerance: float = 1e-9,
     max_steps: int = 100,
