@@ -11,7 +11,7 @@ from reojax.manoeuvres import Layout
 from reojax.plan.chain import Word
 from reojax.plan.library import Library, Starts
 from reojax.plan.loops import Table, fold_rotation, tabulate, true_rotations
-from reojax.plan.search import refine, shorten, solve
+from reojax.plan.search import Found, refine, shorten, solve
 from reojax.plan.words import Box, last_twist
 from reojax.robot import Robot
 
@@ -19,8 +19,12 @@ _ROWS = 256
 """Rows per call."""
 SIZES = (2, 4, 6)
 """Numbers of slots that there are programs for."""
+_BURSTS = (6, 10)
+"""Steps on the table."""
 _NEWTON = 12
 """Steps on the true rotations."""
+_SHORT = 1e-6
+"""Largest change of amplitudes [rad] of a step that, from within the tolerance, is not looked at where it ends."""
 _SOFTEST = 1e-10
 """Least damping of those steps, relative to the squared derivatives."""
 
@@ -74,13 +78,25 @@ def travel(box: Box, rows: Rows) -> np.ndarray:
 
 
 def attempt(scene: Scene, targets: np.ndarray, rows: Rows) -> Rows:
-    """Solve rows on the table."""
-    return _on_table(scene, targets, rows, lambda word, x, _: solve(scene.table, word, x))
+    """Solve rows on the table; after some steps only those go on that still come nearer."""
+    found, going = rows._replace(x=rows.x.copy(), square=rows.square.copy()), np.arange(len(rows.owner))
+    for steps in _BURSTS:
+        if not len(going):
+            break
+        x, square, more = _on_table(
+            scene, targets, found.take(going), lambda word, x, _, steps=steps: solve(scene.table, word, x, steps)
+        )
+        found.x[..., going], found.square[going] = x, square
+        going = going[more]
+    return found
 
 
 def shortened(scene: Scene, targets: np.ndarray, rows: Rows) -> Rows:
     """Less travel for solved rows, on the table."""
-    return _on_table(scene, targets, rows, lambda word, x, price: shorten(scene.table, word, x, price))
+    if not len(rows.owner):
+        return rows
+    x, square, _ = _on_table(scene, targets, rows, lambda word, x, price: shorten(scene.table, word, x, price))
+    return rows._replace(x=x, square=square)
 
 
 def settle(scene: Scene, targets: np.ndarray, rows: Rows, tolerance: float) -> Rows:
@@ -99,7 +115,9 @@ def settle(scene: Scene, targets: np.ndarray, rows: Rows, tolerance: float) -> R
         strength[going] *= np.where(better, 0.1, 100)
         strength = np.maximum(strength, _SOFTEST)
         x[..., going] = np.where(better, moved, 0.5 * (at.x + best.x[..., going]))
-        going = going[best.square[going] > min(tolerance, 1e-11) ** 2]
+        there = (square <= tolerance**2) & (np.abs(moved - at.x).max((0, 1)) < _SHORT)
+        best.x[..., going[there]] = moved[..., there]
+        going = going[~there & (best.square[going] > min(tolerance, 1e-11) ** 2)]
     return best
 
 
@@ -137,19 +155,15 @@ def least(rows: Rows, value: np.ndarray, keep: int = 1) -> Rows:
     return rows.take(order[rank < keep])
 
 
-def _on_table(scene: Scene, targets: np.ndarray, rows: Rows, program: Callable) -> Rows:
-    def run(chunk):
+def _on_table(scene: Scene, targets: np.ndarray, rows: Rows, program: Callable[..., Found]) -> Found:
+    def run(chunk: tuple[Word, np.ndarray, int, slice]) -> list[np.ndarray]:
         word, x, size, _ = chunk
         costs = price(scene.box, np.asarray(word.letter), np.asarray(word.runs))
-        found = program(word, x, costs)
-        return np.asarray(found.x)[..., :size], np.asarray(found.square)[:size]
+        return [np.asarray(field)[..., :size] for field in program(word, x, costs)]
 
-    if not len(rows.owner):
-        return rows
     with ThreadPoolExecutor(2) as pool:
         results = list(pool.map(run, _chunks(scene, targets, rows)))
-    x = np.concatenate([x for x, _ in results], axis=-1)
-    return rows._replace(x=x, square=np.concatenate([square for _, square in results]))
+    return Found(*(np.concatenate(field, axis=-1) for field in zip(*results, strict=True)))
 
 
 def _chunks(scene: Scene, targets: np.ndarray, rows: Rows) -> Iterator[tuple[Word, np.ndarray, int, slice]]:

@@ -52,26 +52,22 @@ def miss(table: Table, word: Word, x: Float[Array, "d k m"]) -> Miss:
 def chained(word: Word, q: Float[Array, "4 k m"], dq: Float[Array, "d 4 k m"]) -> Miss:
     """Put the loops' quaternions and their derivatives together."""
     q, dq = jax.lax.optimization_barrier(_powers(word.runs, q, dq))  # once, not again for every product
-    slots = q.shape[1]
-    before = [inverse(tuple(word.target))]
-    for i in range(slots):
-        before.append(product(before[-1], tuple(q[:, i])))
-    one = jnp.zeros_like(word.target).at[0].set(1.0)
-    after = [tuple(one)]
-    for i in reversed(range(1, slots)):
-        after.append(product(tuple(q[:, i]), after[-1]))
-    w, *v = before.pop()
+    rest = jnp.ones_like(word.target[0]), *jnp.zeros_like(word.target[1:])
+
+    def onward(before, q):
+        return product(before, q), before
+
+    def back(after, q):
+        return product(q, after), after
+
+    (w, *v), left = jax.lax.scan(onward, inverse(tuple(word.target)), tuple(q))
+    _, right = jax.lax.scan(back, rest, tuple(q), reverse=True)
     sign = jnp.where(w < 0, -2.0, 2.0).astype(w.dtype)
     residual = sign[None] * jnp.stack(v)
-    left, right = jax.lax.optimization_barrier((_slots(before), _slots(after[::-1])))
+    left, right = (tuple(component[None] for component in side) for side in (left, right))
     changes = product(product(left, tuple(dq[:, i] for i in range(4))), right)
     jacobian = sign[None, None, None] * jnp.stack(changes[1:], axis=2)
     return Miss(residual, jacobian, (residual * residual).sum(0))
-
-
-def _slots(quaternions: Sequence[Sequence[Array]]) -> tuple[Array, ...]:
-    """Components, each (1, k, m), of one quaternion for each slot."""
-    return tuple(jnp.stack(component)[None] for component in zip(*quaternions, strict=True))
 
 
 def _powers(count: Array, q: Array, dq: Array) -> tuple[Array, Array]:

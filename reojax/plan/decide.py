@@ -12,12 +12,12 @@ import numpy as np
 from reojax.plan import quaternions
 from reojax.plan.attempts import SIZES, Rows, Scene, attempt, least, settle, shortened, starting_rows, travel
 from reojax.plan.grouped import grouped_rows, loops
-from reojax.plan.library import Starts
+from reojax.plan.library import FIRST, Starts
 
 LONGEST = 5
 """Longest word whose loops each have amplitudes of their own; longer words repeat loops."""
-_ROUNDS = ((0, 3), (3, 10), (10, 40))
-"""Starts tried for each target, from and to in order of distance; each round where those before failed."""
+_ROUNDS = ((0, FIRST), (FIRST, 10), (10, 40))
+"""Starts tried for each target, from and to; each round where those before failed."""
 _LAST_ROUND = (40, 240)
 """Further starts for what is not reached with the longest word that is allowed."""
 _HOPE = 0.1
@@ -92,12 +92,13 @@ def _with_loops(
 ) -> None:
     """Try words of `slots` loops for what is not reached yet."""
     waiting = np.flatnonzero(~answer.solved)
-    starts = scene.library.near(targets[:, waiting], slots, rounds[-1][1])
-    closest = np.where(starts.distance[:, 0] < _FAR.get(slots, _FAR_LONG), 0.0, np.inf)
+    waiting = waiting[scene.library.reaches(targets[:, waiting], slots, _FAR.get(slots, _FAR_LONG))]
+    closest = np.zeros(len(waiting))
     close = _CLOSE_FEW.get(slots, _CLOSE)
     for first, last in rounds:
         trying = np.flatnonzero(~answer.solved[waiting] & (closest < _HOPE))
-        some = Starts(*(field[..., trying, first:last] for field in starts))
+        starts = scene.library.near(targets[:, waiting[trying]], slots, last)
+        some = Starts(*(field[..., first:last] for field in starts))
         found = attempt(scene, targets, starting_rows(waiting[trying], some))
         if slots in _CLOSE_FEW:
             found = _continued(scene, targets, found)
@@ -118,9 +119,9 @@ def _continued(scene: Scene, targets: np.ndarray, found: Rows) -> Rows:
 
 
 def cheapest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> Answer:
-    """Words of least travel, of up to `most` loops."""
-    answer = Answer(scene, targets, tolerance)
-    waiting = np.flatnonzero(~answer.solved)
+    """Words of least travel, of up to `most` loops; never more than those of the fewest loops."""
+    answer = fewest(scene, targets, min(most, LONGEST), tolerance)
+    waiting = np.flatnonzero((answer.travel > 0) | ~answer.solved)
     for slots in range(1, min(most, LONGEST) + 1):
         starts = scene.library.near(targets[:, waiting], slots, _ROUNDS[-1][1])
         rows = starting_rows(waiting, starts)

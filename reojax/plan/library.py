@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from reojax.plan import quaternions
 from reojax.plan.loops import Table, read
@@ -14,6 +14,11 @@ _POOL = 4096
 """Loops drawn for each letter."""
 _WORDS = 1 << 16
 """Words of each length."""
+
+FIRST = 3
+"""Starts that are simply the nearest ones."""
+_CANDIDATES = 250
+"""Words among which the others are chosen."""
 
 _read = jax.jit(read)
 
@@ -43,15 +48,30 @@ class Library:
         small[1] = False
         x = np.where(small, x * 10.0 ** -rng.uniform(0, 3, x.shape), x)
         self._letter, self._x = letter, x
+        turns = x[::2] * x[1:2] < 0  # which way round, by each distal joint
+        self._kind = 2 * letter + turns[0] if len(turns) == 1 else 2 * turns[0] + turns[1]
         self._q = np.asarray(_read(table, letter, x)[0])
         self._words = {}
 
+    def reaches(self, target: Float[np.ndarray, "4 m"], slots: int, within: float) -> Bool[np.ndarray, " m"]:
+        """Whether a word of `slots` loops ends within a chord of each target."""
+        return np.isfinite(self._of(slots)[1].query(target.T, distance_upper_bound=within, workers=-1)[0])
+
     def near(self, target: Float[np.ndarray, "4 m"], slots: int, count: int) -> Starts:
-        """The `count` words of `slots` loops nearest to each target, (..., m, count) without regard to the sign."""
+        """Words of `slots` loops near each target, (..., m, count), without regard to the quaternion's sign.
+
+        First come the `FIRST` nearest ones, then the nearest of every kind (letters, and which way round each loop
+        goes), then the second of every kind, and so on: where one fails, others of its kind mostly fail too.
+        """
         index, tree = self._of(slots)
-        distance, nearest = tree.query(target.T, k=count, workers=-1)
-        nearest = np.reshape(nearest, (-1, count)) % index.shape[1]
-        return Starts(self._letter[index][:, nearest], self._x[:, index][:, :, nearest], distance.reshape(-1, count))
+        asked = count if count <= FIRST else max(count, _CANDIDATES)
+        distance, nearest = tree.query(target.T, k=asked, workers=-1)
+        distance, loops = distance.reshape(-1, asked), index[:, np.reshape(nearest, (-1, asked)) % index.shape[1]]
+        if count < asked:
+            chosen = _by_kind(self._kind[loops])[:, :count]
+            distance = np.take_along_axis(distance, chosen, 1)
+            loops = np.take_along_axis(loops, chosen[None], 2)
+        return Starts(self._letter[loops], self._x[:, loops], distance)
 
     def _of(self, slots: int):
         from scipy.spatial import KDTree
@@ -70,3 +90,17 @@ class Library:
 def _of_length(slots: int, loops: int) -> np.ndarray:
     """Loops (slots, words) of random words; the same whatever was asked for before."""
     return np.random.default_rng(slots).integers(loops, size=(slots, _WORDS))
+
+
+def _by_kind(kinds: Int[np.ndarray, "k m n"]) -> Int[np.ndarray, "m n"]:
+    """Order of n words with loops of some `kinds` (0..3): the `FIRST`, then the first of each kind, then the second."""
+    kind = np.zeros(kinds.shape[1:], int)
+    for of_slot in kinds:
+        kind = 4 * kind + of_slot
+    order, place = np.argsort(kind, axis=1, kind="stable"), np.arange(kinds.shape[2])[None]
+    together = np.take_along_axis(kind, order, 1)
+    begins = np.concatenate([np.ones_like(together[:, :1]), np.diff(together, axis=1)], axis=1) != 0
+    rank = np.empty_like(kind)
+    np.put_along_axis(rank, order, place - np.maximum.accumulate(np.where(begins, place, 0), axis=1), 1)
+    rank[:, :FIRST] = -1
+    return np.argsort(rank, axis=1, kind="stable")

@@ -6,6 +6,8 @@ search; what it finds is then solved on the true rotations.
 """
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -14,14 +16,15 @@ import numpy as np
 from jaxtyping import Float
 
 from reojax._arrays import Array
-from reojax.holonomy import DEFAULT_STEPS, net_rotation
+from reojax._fast.components import Pattern, pattern_of
+from reojax.holonomy import DEFAULT_STEPS, _net_rotation, net_rotation
 from reojax.manoeuvres import Layout
-from reojax.path import Path, polygon
+from reojax.path import polygon
 from reojax.plan import quaternions
 from reojax.plan.words import Box, folded, last_twist, loop_corners
 from reojax.robot import Robot
 
-_CHUNK = 256
+_CHUNK = 128
 """Loops per call: one program for any number of them."""
 _LONGEST_EDGE = 4.8
 """Largest change of a joint angle on an edge for which the default steps are meant [rad]."""
@@ -39,12 +42,19 @@ def true_rotations(robot: Robot, layout: Layout, amplitudes: Float[np.ndarray, "
     corners = np.pad(loop_corners(layout, twist, bend, last), ((0, padded), (0, 0), (0, 0)))
     steps = 2 * DEFAULT_STEPS * max(1, int(np.ceil(np.abs(amplitudes).max(initial=0.0) / _LONGEST_EDGE)))
 
-    def rotation(corners: Array) -> Array:
-        return net_rotation(robot, Path(corners), steps=steps)
+    pattern = pattern_of(robot)
 
-    chunks = corners.reshape(-1, _CHUNK, *corners.shape[1:])
-    turned = [np.asarray(jax.vmap(rotation)(chunk)) for chunk in chunks]
+    def rotations(chunk: np.ndarray) -> np.ndarray:
+        return np.asarray(_net_rotations(robot, chunk, steps, pattern))
+
+    with ThreadPoolExecutor(2) as pool:
+        turned = list(pool.map(rotations, corners.reshape(-1, _CHUNK, *corners.shape[1:])))
     return quaternions.from_matrices(np.concatenate([np.zeros((0, 3, 3)), *turned])[:count])
+
+
+@partial(jax.jit, static_argnums=(2, 3))
+def _net_rotations(robot: Robot, corners: Array, steps: int, pattern: Pattern) -> Array:
+    return jax.vmap(lambda corners: _net_rotation(robot, corners, steps, pattern))(corners)
 
 
 def fold_rotation(robot: Robot, layout: Layout) -> Float[np.ndarray, "4"]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from reojax._arrays import Array
 from reojax.plan.chain import Miss, Word, chained, dual, miss, pull, step
@@ -18,6 +18,8 @@ from reojax.plan.loops import Table, read
 
 _SOLVED = 1e-14
 """Squared residual [rad^2] at which the search on the table stops; the true rotations take over."""
+_STALLED = 0.9
+"""Part of the squared residual that two steps must leave for more steps to be tried; what will arrive is faster."""
 _FEASIBLE = 1e-10
 """Squared residual up to which a shortened word still counts as on the target."""
 
@@ -29,32 +31,34 @@ class Found(NamedTuple):
     """Amplitudes [rad]."""
     square: Float[Array, " m"]
     """Squared residual on the table [rad^2]."""
+    going: Bool[Array, " m"]
+    """Whether more steps may bring it to the target."""
 
 
-@partial(jax.jit, static_argnums=3)
-def solve(table: Table, word: Word, x: Array, steps: int = 16) -> Found:
+@jax.jit
+def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Found:
     """Bring words to their targets by Levenberg-Marquardt steps, clipped to the box."""
-    at = miss(table, word, x)
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
 
     def body(state):
-        i, x, at, strength = state
-        length = jnp.sqrt(at.square)
-        damping = strength * length * (at.jacobian**2).sum((0, 1, 2))
-        dx = _inside(x, word, used, lambda free, held: step(at, free, held, damping))
-        tried = jnp.clip(x + dx, word.low, word.high)
+        i, x, tried, at, strength, before = state
         then = miss(table, word, tried)
         better = then.square < at.square
+        before = jnp.stack([at.square, before[0]])
         strength = jnp.clip(jnp.where(better, 0.2 * strength, 6 * strength), 1e-4, 1e6)
-        return i + 1, jnp.where(better[None, None], tried, x), _choose(better, then, at), strength
+        x, at = jnp.where(better[None, None], tried, x), _choose(better, then, at)
+        damping = strength * jnp.sqrt(at.square) * (at.jacobian**2).sum((0, 1, 2))
+        dx = _inside(x, word, used, lambda free, held: step(at, free, held, damping))
+        return i + 1, x, jnp.clip(x + dx, word.low, word.high), at, strength, before
 
     def going(state):
-        i, _, at, strength = state
-        return (i < steps) & ((at.square > _SOLVED) & (strength < 1e5)).any()
+        i, _, _, at, strength, _ = state
+        return (i <= steps) & ((at.square > _SOLVED) & (strength < 1e5)).any()
 
-    start = (0, x, at, jnp.full_like(at.square, 0.3))
-    _, x, at, _ = jax.lax.while_loop(going, body, start)
-    return Found(x, at.square)
+    nothing = _nothing(x)
+    start = (0, x, x, nothing, jnp.full_like(nothing.square, 1.5), jnp.stack([nothing.square] * 2))
+    _, x, _, at, _, before = jax.lax.while_loop(going, body, start)
+    return Found(x, at.square, (at.square > _SOLVED) & (at.square < _STALLED * before[1]))
 
 
 @partial(jax.jit, static_argnums=4)
@@ -73,25 +77,23 @@ def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], st
         longest = jnp.abs(along).max((0, 1))
         return (reach / jnp.where(longest > 0, longest, 1.0))[None, None] * along + step(at, free, held, zero)
 
-    def body(_, state):
-        x, at, reach = state
-
-        def move(i, moving):  # first along the solutions, then twice back to them
-            tried, then = moving
-            length = jnp.where(i == 0, reach, 0.0)
-            dx = _inside(tried, word, used, lambda free, held: direction(then, free, held, length))
-            tried = jnp.clip(tried + dx, word.low, word.high)
-            return tried, miss(table, word, tried)
-
-        tried, then = jax.lax.fori_loop(0, 3, move, (x, at))
+    def body(i, state):
+        """Evaluate what was tried; every third time, after one step along the solutions and two back to them, judge."""
+        x, tried, at, reach = state
+        then = miss(table, word, tried)
+        judged, first = i % 3 == 0, i == 0
         less = (slope * (tried - x)).sum((0, 1)) < 0
-        better = less & (then.square < _FEASIBLE)
-        reach = jnp.clip(jnp.where(better, 1.8 * reach, 0.3 * reach), 1e-6, 1.0)
-        return jnp.where(better[None, None], tried, x), _choose(better, then, at), reach
+        better = judged & (first | (less & (then.square < _FEASIBLE)))
+        reach = jnp.where(judged & ~first, jnp.clip(jnp.where(better, 1.8, 0.3) * reach, 1e-6, 1.0), reach)
+        x, at = jnp.where(better[None, None], tried, x), _choose(better, then, at)
+        here = jnp.where(judged, x, tried)
+        then = jax.tree.map(lambda a, b: jnp.where(judged, a, b), at, then)
+        length = jnp.where(judged, reach, 0.0)
+        dx = _inside(here, word, used, lambda free, held: direction(then, free, held, length))
+        return x, jnp.clip(here + dx, word.low, word.high), at, reach
 
-    state = (x, miss(table, word, x), jnp.full_like(zero, 0.2))
-    x, at, _ = jax.lax.fori_loop(0, steps, body, state)
-    return Found(x, at.square)
+    x, _, at, _ = jax.lax.fori_loop(0, 3 * steps + 1, body, (x, x, _nothing(x), jnp.full_like(zero, 0.2)))
+    return Found(x, at.square, at.square < 0)
 
 
 @jax.jit
@@ -144,6 +146,12 @@ def _up_to_the_edge(x: Array, word: Word, used: Array, direction: Callable[[Arra
         return free & ~beyond, jnp.where(beyond, jnp.clip(x + dx, word.low, word.high) - x, dx)
 
     return jax.lax.fori_loop(0, 4, hold, (used, jnp.zeros_like(x)))[1]
+
+
+def _nothing(x: Array) -> Miss:
+    """What is known before anything is evaluated."""
+    d, k, m = x.shape
+    return Miss(jnp.zeros((3, m), x.dtype), jnp.zeros((d, k, 3, m), x.dtype), jnp.full(m, jnp.inf, x.dtype))
 
 
 def _choose(better: Array, then: Miss, at: Miss) -> Miss:
