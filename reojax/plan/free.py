@@ -35,8 +35,10 @@ _EXACT = {8: 1e-10, 4: 1e-5}
 """Miss [rad] that the solver goes for, by the bytes of a number."""
 _REACHED, _NEAR = 1e3, 1e7
 """How many times that much counts as on the target for the time being, and how many as near to it."""
-_LAST_STEPS, _LAST = 10, 4
-"""Steps of the solver that bring the true rotation onto the target, and how often at most."""
+_LAST = 4
+"""How often, at most, the target is shifted to bring the true rotation onto it."""
+_ANY = 1e6
+"""Slope that stops the solver as soon as the target is met."""
 _OFF = 1e6
 """Joint travel [rad] that is worse than any."""
 
@@ -135,7 +137,7 @@ class _Solver(NamedTuple):
     bar: Any
 
     def __call__(
-        self, x: np.ndarray, targets: np.ndarray, rounding: float, steps: int
+        self, x: np.ndarray, targets: np.ndarray, rounding: float, steps: int, slope: float = _SLOPE
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Improve polygons (m, n) for targets (m, 3, 3): the polygons, their misses and their travel (m,)."""
         parts = [(x[:0], np.zeros(0), np.zeros(0))]
@@ -150,7 +152,7 @@ class _Solver(NamedTuple):
                 equality=self.polygons.miss,
                 data=(targets[take], np.full(self.rows, rounding)),
                 tolerance=self.exact,
-                slope_tolerance=_SLOPE,
+                slope_tolerance=slope,
                 max_steps=steps,
             )
             size = min(self.rows, len(x) - first)
@@ -185,10 +187,10 @@ def _shortest(solver: _Solver, found: np.ndarray, targets: np.ndarray, max_steps
     error = _apart(turned, wanted)
     for k in range(_LAST + 1):
         near = error < _NEAR * solver.exact
-        going = np.flatnonzero(near & (error > 0.1 * tolerance)) if k else np.arange(len(x))
+        going = np.flatnonzero(near & (error > 0.5 * tolerance)) if k else np.arange(len(x))
         shift = wanted[going] @ turned[going].swapaxes(1, 2)
         new = np.where(near[going, None, None], shift @ aim[going], wanted[going])
-        moved, _, _ = solver(x[going], new, _SHARP, _LAST_STEPS if k else max_steps)
+        moved, _, _ = solver(x[going], new, _SHARP, max_steps, _ANY if k else _SLOPE)
         now = polygons.rotations(moved)
         off = _apart(now, wanted[going])
         better = off < np.maximum(error[going], 0.0 if k else _REACHED * solver.exact)
