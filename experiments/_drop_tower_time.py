@@ -16,19 +16,18 @@ EFFICIENT = 1.1  # chosen: at most a tenth longer than the least time is efficie
 def section(out: Path, *, quick: bool) -> dict[str, Any]:
     """Figure 3.2 on the prototype and on a rotor with no load, and least times of A and of a half turn."""
     robot, rows, result = robots.prototype(), [], {}
-    bend = reojax.polygon(np.array([[0, 0, 0], [0, 2 * np.pi / 3, 0]]))
-    alone = reojax.make_robot(
-        mass=[1.0, 1e-9], com=np.zeros((2, 3)), inertia=[np.eye(3), 1e-12 * np.eye(3)], axis=[(1, 0, 0)],
-        anchor=[(0, 0, 0)], rotor_inertia=[1e-7], gear_ratio=[24.0], joint_names=["rotor alone"], name="rotor",
-    )  # fmt: skip
-    turn = reojax.polygon([[0.0], [2 * np.pi / 3]])
-    for name, body, path, joint in (("prototype", robot, bend, 1), ("rotor alone", alone, turn, 0)):
-        verdicts, least = _figure(out, name, body, path, joint)
+    path = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
+    for name, body in (("prototype", robot), ("rotor alone", loaded(0.0))):
+        verdicts, least = _figure(out, name, body, path)
         result[name] = {"least_s": least, "verdicts": dict(zip(map(str, STEPS), verdicts, strict=True))}
         said = "90 efficient, 80 over-used"
         rows.append((f"figure 3.2, {name}: least time of step 1 [ms]", "between 80 and 90", f"{1e3 * least:.1f}"))
         rows.append((f"figure 3.2, {name}: 110, 100, 90, 80 ms", said, ", ".join(verdicts)))
-    path = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
+    load = _load(robot, path)
+    result["load"] = load
+    felt = f"{1e6 * load['straight']:.0f}, {1e6 * load['bent']:.0f}"
+    rows.append(("figure 3.2, prototype: inertia it moves, straight, bent [kg mm^2]", "", felt))
+    rows.append(("figure 3.2: inertia that it may move in 90 ms [kg mm^2]", "", f"{1e6 * load['for_90_ms']:.1f}"))
     times = {
         f"A, rectangle, {law}": float(minimum_time(robot, path, RE_MAX_17, law).duration)
         for law in ("quintic", "trapezoid")
@@ -52,16 +51,43 @@ def section(out: Path, *, quick: bool) -> dict[str, Any]:
     return result | {"least_times_s": times, "rows": rows}
 
 
-def _figure(out: Path, name: str, robot: reojax.Robot, path: reojax.Path, joint: int) -> tuple[list[str], float]:
+def loaded(inertia: float) -> reojax.Robot:
+    """A robot whose centre joint moves that inertia and its rotor, against links too heavy to give way."""
+    heavy, nothing = np.eye(3), 1e-12 * np.eye(3)
+    return robots.prototype().replace(
+        mass=np.array([1.0, 1.0, 1e-9, 1e-9]),
+        com=np.zeros((4, 3)),
+        anchor=np.zeros((3, 3)),
+        inertia=np.stack([heavy, heavy, nothing + inertia * np.eye(3), nothing]),
+    )
+
+
+def first_step(robot: reojax.Robot, path: reojax.Path) -> float:
+    """Least time of the centre joint's first step by a quintic [s]."""
+    return float(minimum_time(robot, path, RE_MAX_17).durations[0])
+
+
+def _load(robot: reojax.Robot, path: reojax.Path) -> dict[str, float]:
+    """Inertia that the centre joint moves, its own rotor left out, and the one for which the step takes 90 ms."""
+    from scipy.optimize import brentq
+
+    own = float(robot.rotor_inertia[1] * robot.gear_ratio[1] ** 2)
+    felt = [float(reojax.joint_inertia(robot, shape)[1, 1]) - own for shape in path.waypoints[:2]]
+    most, _ = brentq(lambda inertia: first_step(loaded(inertia), path) - STEPS[2], 0.0, 1e-4, full_output=True)
+    return {"straight": felt[0], "bent": felt[1], "for_90_ms": float(most)}
+
+
+def _figure(out: Path, name: str, robot: reojax.Robot, path: reojax.Path) -> tuple[list[str], float]:
     """Draw figure 3.2 for a robot; return the verdicts and the least time [s]."""
-    least = float(minimum_time(robot, path, RE_MAX_17).duration)
+    least = first_step(robot, path)
     verdicts = [_verdict(seconds, least) for seconds in STEPS]
     runs = []
     for seconds, verdict in zip(STEPS, verdicts, strict=True):
-        motion = reojax.simulate(robot, path, durations=seconds, motors=RE_MAX_17, samples=64)
+        step = reojax.polygon(path.waypoints[:2])
+        motion = reojax.simulate(robot, step, durations=seconds, motors=RE_MAX_17, samples=64)
         runs.append((f"{1e3 * seconds:.0f} ms: {verdict}", motion))
     title = f"Centre joint, 0 to 120°, quintic, 12 V: {name}"
-    figure = plot.torque_speed_figure(RE_MAX_17, runs, joint_names=robot.joint_names, joints=[joint], title=title)
+    figure = plot.torque_speed_figure(RE_MAX_17, runs, joint_names=robot.joint_names, joints=[1], title=title)
     plot.save(figure, out / f"drop_tower_figure_3_2_{name.replace(' ', '_')}.png")
     return verdicts, least
 

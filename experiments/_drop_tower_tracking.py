@@ -78,6 +78,7 @@ def section(out: Path, *, quick: bool, durations: Sequence[float] = DURATIONS) -
             apart = tilt_and_roll(done.rotation) - tilt_and_roll(planned)
             last = done.rotation[-1].T @ planned[-1]
             error = np.abs(done.theta - done.planned)
+            past = np.maximum(done.theta - robot.upper, robot.lower - done.theta).max()
             result["cases"].append(
                 {
                     "manoeuvre": manoeuvre,
@@ -87,6 +88,7 @@ def section(out: Path, *, quick: bool, durations: Sequence[float] = DURATIONS) -
                     "tilt_roll_rms_rad": np.sqrt((apart**2).mean(axis=0)),
                     "joint_rms_rad": np.sqrt((error**2).mean(axis=0)),
                     "largest_lag_rad": float(error.max()),
+                    "beyond_limits_rad": max(0.0, float(past)),
                     "end_orientation_error_rad": float(np.arccos(np.clip((np.trace(last) - 1) / 2, -1, 1))),
                     "saturated_share": float(done.saturated.mean()),
                 }
@@ -120,5 +122,6 @@ def _rows(case: dict[str, Any]) -> list[tuple[str, str, str]]:
     return [
         (f"{where}: RMS of ZXZ angles [rad]", measured, angles),
         (f"{where}: largest lag of a joint [rad]", "joints lag", f"{case['largest_lag_rad']:.2f}"),
+        (f"{where}: a joint goes beyond its limits by [rad]", "", f"{case['beyond_limits_rad']:.2f}"),
         (f"{where}: end orientation off by [rad]", "right", f"{case['end_orientation_error_rad']:.4f}"),
     ]
