@@ -98,7 +98,14 @@ def _draw(rows: list[dict], answer: dict) -> Figure:
     most = 1.05 * both.max()
     left.plot(*both.T, "o", ms=4, color="#0072b2", alpha=0.6)
     for share, style in ((1.0, "-"), (0.7, "--"), (0.4, ":")):
-        left.plot([0, most], [0, share * most], style, color="0.4", lw=1, label=f"{100 * (1 - share):.0f} % less")
+        left.plot(
+            [0, most],
+            [0, share * most],
+            style,
+            color="0.4",
+            lw=1,
+            label=f"{100 * (1 - share):.0f} % less" if share < 1 else "equal",
+        )
     left.set(xlabel="joint travel of the best word of A and B [deg]", ylabel="joint travel of the free path [deg]")
     left.set(xlim=(0, most), ylim=(0, most), title="Each dot is one target")
     left.legend(frameon=False, loc="upper left")

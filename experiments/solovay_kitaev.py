@@ -124,7 +124,7 @@ def _draw(rows: list[dict], planned: dict) -> Figure:
         ax.loglog(row["manoeuvres"], error, ".", color=colour, label=f"recursion {row['degree']}")
     ax.loglog(planned["manoeuvres"], np.rad2deg(planned["error_rad"]), "k^", ms=4, label="plan, own amplitudes")
     ax.set(xlabel="manoeuvres", ylabel="error [deg]", title="Fixed A and B, and plans: a mark for each target")
-    ax.legend(frameon=False, fontsize="small", loc="center right")
+    ax.legend(frameon=False, fontsize="small", loc="lower right")
     return figure
 
 

@@ -30,7 +30,7 @@ _FINALISTS = 2
 _ROUND, _SHARP = 0.1, 0.01
 """Rounding of the joint travel on each edge [rad], at first and at the end."""
 _SLOPE = 3e-3
-"""Slope, as in `design.Solution`, at which the joint travel is within a percent or so of its least."""
+"""Slope, as in `design.Solution`, at which the search for less joint travel stops."""
 _EXACT = {8: 1e-10, 4: 1e-5}
 """Miss [rad] that the solver goes for, by the bytes of a number."""
 _REACHED, _NEAR = 1e3, 1e7
