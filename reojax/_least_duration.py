@@ -31,6 +31,8 @@ _FINE = 48
 """Steps per piece for the net rotation of the answer."""
 _EXACT = 1e-8
 """Largest error of an answer's net rotation that counts as converged [rad]."""
+_ROUNDING = 1e-12
+"""What a joint may be beyond its limit by rounding [rad]."""
 
 
 class Fastest(NamedTuple):
@@ -120,10 +122,12 @@ def least_duration(task: Task, starts: np.ndarray, box: Box, max_steps: int, pro
         last = 4 + exact(starts[0], halves).size
         best, converged = _least(lambda x: program(x, halves), last, starts, box, max_steps, progress)
         look = lambda x, share: tuple(part[1:last] for part in program(x, share))
-    best = polished(look, build, fine, best, box, equal)
+    if not task.kept or beyond(robot, build(best)) > _ROUNDING:
+        best = polished(look, build, fine, best, box, equal)
     trajectory = build(best)
     trajectory = stretched(trajectory, minimum_stretch(task.robot, trajectory, task.motors))
     error, past = jnp.linalg.norm(fine(trajectory)), beyond(robot, trajectory)
+    past = past if past > _ROUNDING else 0.0  # a corner of a path may lie on a limit
     return Fastest(
         trajectory=trajectory,
         duration=trajectory.duration,
