@@ -114,6 +114,7 @@ def test_the_command_line_writes_what_it_says(capsys, monkeypatch, tmp_path):
     [
         (["a.yaml"], "reojax export: --duration is missing"),
         (["a.yaml", "--duration", "0"], "reojax export: argument --duration: '0' must be positive and finite"),
+        (["a.csv", "--duration", "1e-300"], "reojax export: argument --duration: '1e-300' must be positive and finite"),
         (["a.yaml", "--duration", "1,x"], "reojax export: argument --duration: '1,x' is not a number"),
         (["a.yaml", "--duration", "1,2"], "reojax export: `durations` has shape (2,)"),
         (["a.yaml", "--duration", "1", "--law", "jump"], "reojax export: there is no time law named 'jump'"),

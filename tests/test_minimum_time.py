@@ -156,6 +156,11 @@ def test_simulate_by_time_on_the_command_line(monkeypatch, capsys):
     ("arguments", "message"),
     [
         (["time", "--supply", "0"], "reojax time: argument --supply: '0' is not a supply voltage"),
+        (
+            ["time", "--supply", "1e-300"],
+            "reojax time: argument --supply: '1e-300' is not a supply voltage",
+        ),
+        (["simulate", "--duration", "1e-9"], "reojax simulate: argument --duration: '1e-9' is not a duration"),
         (["time", "--supply", "twelve"], "reojax time: argument --supply: 'twelve' is not a number"),
         (["time", "--law", "jump"], "reojax time: there is no time law named 'jump'"),
         (["time", "--twist", "0", "--bend", "0"], "reojax time: nothing moves"),

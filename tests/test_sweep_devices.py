@@ -17,7 +17,7 @@ from reojax.sweep import merge
 
 
 def start(store, *, flags="", **options) -> subprocess.Popen:
-    environment = {**os.environ, "XLA_FLAGS": flags}
+    environment = {**os.environ, "XLA_FLAGS": f"{os.environ.get('XLA_FLAGS', '')} {flags}"}
     command = [sys.executable, sweep_child.__file__, str(store), json.dumps(options)]
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 

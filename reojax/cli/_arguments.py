@@ -8,6 +8,8 @@ from typing import NoReturn
 
 LARGEST_ANGLE = 36000.0
 """Largest amplitude at the command line [deg]: a hundred turns."""
+SHORTEST = 1e-4
+"""Shortest duration at the command line [s]; a power of a shorter one may not be a number."""
 
 
 class BadInput(Exception):

@@ -4,9 +4,13 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
+from reojax.cli._arguments import SHORTEST
+
 if TYPE_CHECKING:
     from reojax.motor import Motor
 
+WEAKEST = 1e-3
+"""Weakest supply at the command line [V]; no motor moves by less."""
 LONGEST = 1e4
 """Longest duration at the command line [s]."""
 
@@ -21,12 +25,12 @@ def add_motors(parser: argparse.ArgumentParser, *, law: str | None) -> None:
 
 def volts(text: str) -> float:
     """Read a supply voltage (an argparse type)."""
-    return _positive(text, "a supply voltage", 1e4)
+    return _between(text, "a supply voltage", WEAKEST, 1e4)
 
 
 def seconds(text: str) -> float:
     """Read a duration (an argparse type)."""
-    return _positive(text, "a duration in seconds", LONGEST)
+    return _between(text, "a duration in seconds", SHORTEST, LONGEST)
 
 
 def momentum(text: str) -> list[float]:
@@ -47,11 +51,11 @@ def motor_at(supply: float) -> "Motor":
     return RE_MAX_17._replace(supply=supply)
 
 
-def _positive(text: str, what: str, most: float) -> float:
+def _between(text: str, what: str, least: float, most: float) -> float:
     try:
         number = float(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
-    if not (math.isfinite(number) and 0 < number <= most):
-        raise argparse.ArgumentTypeError(f"{text!r} is not {what}: it must be above 0 and at most {most:g}")
+    if not least <= number <= most:
+        raise argparse.ArgumentTypeError(f"{text!r} is not {what}: it must be from {least:g} to {most:g}")
     return number

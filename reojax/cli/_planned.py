@@ -4,7 +4,7 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-from reojax.cli._arguments import degrees
+from reojax.cli._arguments import SHORTEST, degrees
 
 if TYPE_CHECKING:
     from reojax.robot import Robot
@@ -46,6 +46,6 @@ def _durations(text: str) -> list[float]:
         seconds = [float(part) for part in text.split(",")]
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number, or several with commas between") from None
-    if not all(math.isfinite(value) and value > 0 for value in seconds):
-        raise argparse.ArgumentTypeError(f"{text!r} must be positive and finite")
+    if not all(math.isfinite(value) and value >= SHORTEST for value in seconds):
+        raise argparse.ArgumentTypeError(f"{text!r} must be positive and finite, {SHORTEST:g} s or more")
     return seconds
