@@ -1,4 +1,4 @@
-"""Free closed paths: on the target, inside the box, no longer than a manoeuvre that does the same; and refusals."""
+"""Free closed paths: on the target, inside the box, shorter than a manoeuvre that does the same; and refusals."""
 
 import jax
 import jax.numpy as jnp
@@ -51,10 +51,10 @@ def test_targets_are_reached_inside_the_box(found):
     np.testing.assert_allclose(found.travel, np.abs(np.diff(found.waypoints, axis=1)).sum((1, 2)))
 
 
-def test_travel_is_no_more_than_what_is_known_to_do(found):
-    """A manoeuvre's own turn takes no more than the manoeuvre, a small turn a small loop, the identity nothing."""
-    assert found.travel[0] < 4 * A[0] + 2 * A[1]
-    assert found.travel[1] < 1.0
+def test_travel_is_little(found):
+    """A manoeuvre's own turn takes a third less than the manoeuvre, a small turn a small loop, the identity nothing."""
+    assert found.travel[0] < 0.67 * (4 * A[0] + 2 * A[1])
+    assert found.travel[1] < 0.3
     np.testing.assert_array_equal(found.waypoints[3], 0)
     assert found.travel[3] == 0
 
