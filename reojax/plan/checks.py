@@ -26,9 +26,9 @@ def rotations(entry: str, value: ArrayLike, shape: tuple[int, ...]) -> np.ndarra
     if not is_concrete(array):
         raise ValueError(f"`{entry}` is traced; planning runs on the host, outside of jit, vmap and grad.")
     array = np.asarray(array, float)
-    if array.ndim != len(shape) or array.shape[-2:] != (3, 3):
+    if array.ndim != len(shape) or array.shape[-2:] != (3, 3) or not array.size:
         text = str(shape).replace("-1", "m")
-        raise ValueError(f"`{entry}` has shape {array.shape}; it must be {text}.")
+        raise ValueError(f"`{entry}` has shape {array.shape}; it must be {text}, at least one rotation.")
     for index, matrix in enumerate(array.reshape(-1, 3, 3)):
         name = f"`{entry}`" if array.ndim == 2 else f"{entry}[{index}]"
         if not np.isfinite(matrix).all():

@@ -84,6 +84,7 @@ def fewest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> An
         _with_loops(scene, targets, answer, longest, (_LAST_ROUND,))
     if most > LONGEST:
         _with_small_loops(scene, targets, most, answer, loops)
+    _as_near_as_possible(scene, targets, answer, longest)
     return answer
 
 
@@ -106,6 +107,14 @@ def _with_loops(
         missed = found.take(found.square >= close)
         answer.offer(least(missed, missed.square))
         _offer_solved(scene, targets, answer, found.take(found.square < close), keep=1)
+
+
+def _as_near_as_possible(scene: Scene, targets: np.ndarray, answer: Answer, slots: int) -> None:
+    """Bring words of `slots` loops near the targets that are not reached, however far away they are."""
+    waiting = np.flatnonzero(~answer.solved)
+    starts = scene.library.near(targets[:, waiting], slots, FIRST)
+    found = attempt(scene, targets, starting_rows(waiting, starts))
+    answer.offer(least(found, found.square))
 
 
 def _continued(scene: Scene, targets: np.ndarray, found: Rows) -> Rows:
