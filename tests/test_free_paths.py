@@ -70,15 +70,10 @@ def test_what_cannot_be_reached_ends_closest_and_says_so():
     np.testing.assert_allclose(one.error, apart(replayed(FreePaths(*(f[None] for f in one)))[0], TARGETS[2]))
 
 
-def test_nothing_to_do():
-    none = free_paths(ROBOT, np.zeros((0, 3, 3)), **LIMITS, **FEW)
-    assert none.waypoints.shape == (0, 7, 3)
-    assert none.converged.shape == (0,)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
+        ({"targets": np.zeros((0, 3, 3))}, "at least one rotation"),
         ({"targets": np.eye(3)}, r"`targets` has shape \(3, 3\); it must be \(m, 3, 3\)"),
         ({"targets": 1.1 * np.eye(3)[None]}, r"targets\[0\] is no rotation"),
         ({"targets": np.full((1, 3, 3), np.nan)}, r"targets\[0\] has an entry nan"),
