@@ -1,6 +1,6 @@
 """How does the cost of a net rotation grow with designs, joints, corners and accuracy?
 
-    python benchmarks/scaling.py                    # minutes on 2 quiet cores; --quick is shorter
+    python benchmarks/scaling.py                    # about 17 minutes on 2 quiet cores; --quick is shorter
 
 Writes scaling.json and scaling.png, one panel for each. Expected: a loop costs the same among a thousand as among
 millions, if they come in batches that fit the cache; cost grows no faster than linearly with joints, compilation
@@ -58,17 +58,22 @@ def main(out: Path, *, quick: bool) -> None:
     result, picture = check_writable(out / "scaling.json"), check_writable(out / "scaling.png")
     before, seconds = machine(), 0.3 if quick else 1.5
     missing: dict[str, str] = {}
-    panels = {
-        "designs": _progress("designs", _designs(quick, seconds)),
-        "joints": _progress("joints", _joints(quick, seconds, missing)),
-        "corners": _progress("corners", _corners(seconds)),
-    }
-    accuracy = _accuracy(64 if quick else 512)
+    about = {"quick": quick, "missing": missing, "machine": before}
+    numbers: dict[str, list] = {}
+    panels: dict[str, list[Point]] = {}
+    for name, points in {
+        "designs": _designs(quick, seconds),
+        "joints": _joints(quick, seconds, missing),
+        "corners": _corners(seconds),
+    }.items():
+        panels[name] = _progress(name, points)
+        numbers[name] = [point._asdict() for point in panels[name]]
+        write_json(result, {**about, **numbers})  # what is measured is kept
+    numbers["accuracy"] = accuracy = _accuracy(64 if quick else 512)
+    about["machine"] = {**before, "load after": machine()["load"]}
+    write_json(result, {**about, **numbers})
     with replacing(picture) as file:
         _figure(panels, accuracy, missing).savefig(file, dpi=140, format="png")
-    numbers = {name: [point._asdict() for point in points] for name, points in panels.items()}
-    about = {"quick": quick, "missing": missing, "machine": {**before, "load after": machine()["load"]}}
-    write_json(result, {**about, **numbers, "accuracy": accuracy})
     say(f"wrote {result} and {picture}")
 
 
