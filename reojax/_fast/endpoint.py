@@ -53,7 +53,7 @@ class Problem(NamedTuple):
 def steps_of_path(robot: Components, points: jax.Array, steps: int) -> Step:
     """Rotation over each of the `steps` steps of each edge, in order."""
     theta, rate = path_nodes(points, steps)
-    base = inward(robot, [sincos(a) for a in theta], rate)
+    base = inward(robot, [sincos(a) for a in theta], rate, keeper(theta[0]))
     return step_rotations(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0]))
 
 
@@ -101,7 +101,7 @@ def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax
     theta, rate = path_nodes(points, problem.steps)
     keep = keeper(theta[0])
     sine_cosine = [keep(sincos(angle)) for angle in theta]
-    base = inward(problem.robot(data), sine_cosine, rate)
+    base = inward(problem.robot(data), sine_cosine, rate, keep)
     base = Base(*(keep(part) for part in base))
     omega = _at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0])
     step = step_rotations(omega)

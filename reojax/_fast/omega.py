@@ -35,6 +35,10 @@ from reojax._fast.scalar import (
     times,
 )
 from reojax._fast.sincos import sincos
+from reojax._fast.store import Keep, keeper
+
+_KEPT = 4
+"""Joints from one kept link to the next."""
 
 
 class Base(NamedTuple):
@@ -52,12 +56,15 @@ class Base(NamedTuple):
 
 def omega(robot: Components, theta: Sequence[jax.Array], rate: Sequence[jax.Array]) -> Vector:
     """Angular velocity of the base, base frame, at joint angles `theta` and `rate`, arrays of one shape."""
-    base = inward(robot, [sincos(angle) for angle in theta], rate)
+    base = inward(robot, [sincos(angle) for angle in theta], rate, keeper(theta[0]))
     return solve(base.inertia, times(-1, base.momentum))
 
 
-def inward(robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate: Sequence[Scalar]) -> Base:
-    """Gather inertia and momentum from the tips to the base."""
+def inward(robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate: Sequence[Scalar], keep: Keep) -> Base:
+    """Gather inertia and momentum from the tips to the base; `keep` (`store`) what every fourth joint hands on.
+
+    Without, XLA computes long chains again for every value they end in: compile time grows with their square or worse.
+    """
     m = list(robot.mass)
     f, J = list(robot.moment), list(robot.inertia)
     p, h = [ZERO] * len(m), [ZERO] * len(m)
@@ -73,6 +80,8 @@ def inward(robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate
         J[parent] = plus(J[parent], plus(conjugate(E, J[link]), _shift(m[link], moment, a)))
         f[parent] = plus(f[parent], plus(moment, times(m[link], a)))
         m[parent] = add(m[parent], m[link])
+        if k and k % _KEPT == 0:
+            p[parent], h[parent], J[parent], f[parent] = (keep(v[parent]) for v in (p, h, J, f))
     centre, drift = times(1 / m[0], f[0]), times(1 / m[0], p[0])
     return Base(
         inertia=plus(J[0], times(-1, point_inertia(m[0], centre))),
