@@ -112,9 +112,6 @@ def free_paths(
     tolerance, max_steps = checks.positive("tolerance", tolerance), checks.whole("max_steps", max_steps)
     box = box_of(robot, layout, "R", twist_limit, bend_limit)
     polygons, library = family_of(robot, layout, box, corners, checks.whole("seed", seed, 0))
-    if not len(given):
-        none = np.zeros(0)
-        return FreePaths(polygons.paths(np.zeros((0, 3 * corners))), given, none, none, none.astype(bool))
     wanted = quaternions.to_matrices(quaternions.from_matrices(given))
     exact = _EXACT[jax.dtypes.canonicalize_dtype(float).itemsize]
     with _bar(progress) as bar:
