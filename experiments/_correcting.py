@@ -94,15 +94,18 @@ def angle_left(now: np.ndarray, target: np.ndarray) -> np.ndarray:
     return Rotation.from_matrix(left.reshape(-1, 3, 3)).as_rotvec().reshape(left.shape[:-1])
 
 
-def estimate(words: Words, measured: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray]:
+def estimate(
+    words: Words, measured: np.ndarray, noise: float, start: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Most probable errors of the inertias (m, links), and orientations (m, 3, 3) at the end, from all readings.
 
     With z the errors in standard deviations, R_k(z) the orientation predicted after manoeuvre k and M_k (m, s, 3, 3)
-    the one measured there, `|z|^2 + sum_k |log(R_k(z)^T M_k)|^2 / noise^2` is made least by Gauss-Newton steps. The
-    orientation is then R(z): early readings sharpen it, as every turn depends on the same numbers.
+    the one measured there, `|z|^2 + sum_k |log(R_k(z)^T M_k)|^2 / noise^2` is made least by Gauss-Newton steps
+    from z = `start` (0 without one). The orientation is then R(z): early readings sharpen it, as every turn depends
+    on the same numbers.
     """
-    z = np.zeros((len(measured), LINKS))
-    start = np.tile(np.eye(3), (len(measured), 1, 1))
+    z = np.zeros((len(measured), LINKS)) if start is None else start
+    upright = np.tile(np.eye(3), (len(measured), 1, 1))
     for _ in range(_ESTIMATING):
         found = turns(z, words)
         effect, slopes = np.zeros((len(z), 3, LINKS)), []
@@ -110,10 +113,10 @@ def estimate(words: Words, measured: np.ndarray, noise: float) -> tuple[np.ndarr
             effect = found.rotation[:, slot].swapaxes(1, 2) @ effect + found.by_robot[:, slot]
             slopes.append(effect)
         slope = np.stack(slopes, axis=1) * (words.used[..., None, None] / noise)
-        miss = angle_left(along(start, found.rotation)[:, 1:], measured) / noise
+        miss = angle_left(along(upright, found.rotation)[:, 1:], measured) / noise
         normal = np.eye(LINKS) + np.einsum("mkan,mkap->mnp", slope, slope)
         z = z + np.linalg.solve(normal, (np.einsum("mkan,mka->mn", slope, miss) - z)[..., None])[..., 0]
-    return z, along(start, turns(z, words).rotation)[:, -1]
+    return z, along(upright, turns(z, words).rotation)[:, -1]
 
 
 def correct(z: np.ndarray, words: Words, start: np.ndarray, target: np.ndarray) -> Words:

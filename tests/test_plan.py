@@ -1,9 +1,10 @@
 """Plans: they end on the target, replay, stay inside the box, use as few loops as were planted, and refuse nonsense."""
 
+import sys
 from functools import partial
+from pathlib import Path
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -13,6 +14,9 @@ from reojax import robots
 from reojax.plan import quaternions
 from reojax.plan.chain import Word, miss
 from reojax.plan.words import word_corners
+
+sys.path.append(str(Path(__file__).parent.parent / "experiments"))
+from _replay import apart, replay
 
 LIMITS = {"twist_limit": float(np.deg2rad(270)), "bend_limit": float(np.deg2rad(120))}
 ROBOT = robots.prototype()
@@ -28,25 +32,13 @@ def lopsided(robot: reojax.Robot) -> reojax.Robot:
     return robot.replace(mass=mass, com=com, inertia=inertia)
 
 
-def replay(robot: reojax.Robot, plan: reojax.Plan) -> np.ndarray:
-    """Rotations after the joint paths of many plans."""
-    paths = jnp.asarray(plan.waypoints)
-    return np.asarray(jax.vmap(lambda corners: reojax.net_rotation(robot, reojax.polygon(corners)))(paths))
-
-
-def apart(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Angles between rotations [rad]."""
-    return (Rotation.from_matrix(p).inv() * Rotation.from_matrix(q)).magnitude()
-
-
 def planted(rng: np.random.Generator, loops: int, count: int) -> np.ndarray:
     """Rotations after `loops` random manoeuvres."""
     letters, x = rng.integers(2, size=(count, loops)), rng.uniform(-1, 1, (2, count, loops))
     twist, bend = LIMITS["twist_limit"] * x[0], LIMITS["bend_limit"] * x[1]
     last = np.where(letters == 0, -twist, twist)
     corners = [word_corners(reojax.FOUR_BODY, *row) for row in zip(twist, bend, last, strict=True)]
-    turn = jax.vmap(lambda corners: reojax.net_rotation(ROBOT, reojax.polygon(corners), steps=8))
-    return np.asarray(turn(jnp.asarray(np.array(corners))))
+    return replay(ROBOT, np.array(corners))
 
 
 def test_random_targets_are_reached_within_the_box_and_replay():
@@ -55,7 +47,7 @@ def test_random_targets_are_reached_within_the_box_and_replay():
     assert plan.converged.all()
     assert (plan.error <= 1e-9).all()
     assert plan.manoeuvres.max() <= 5
-    turned = replay(ROBOT, plan)
+    turned = replay(ROBOT, plan.waypoints)
     assert apart(turned, plan.rotation).max() < 2e-9
     assert apart(turned, targets).max() < 3e-9
     assert (np.abs(plan.waypoints).max((0, 1)) <= ROBOT.upper + 1e-9).all()
@@ -105,7 +97,7 @@ def test_other_robots():
     for robot in (lopsided(ROBOT), robots.six_body()):
         plan = reojax.plan_many(robot, targets, **LIMITS, max_manoeuvres=6)
         assert plan.converged.all()
-        assert apart(replay(robot, plan), targets).max() < 3e-9
+        assert apart(replay(robot, plan.waypoints), targets).max() < 3e-9
         assert (plan.waypoints <= robot.upper + 1e-9).all()
         assert (plan.waypoints >= robot.lower - 1e-9).all()
 
@@ -116,7 +108,16 @@ def test_out_of_reach_is_the_closest_plan():
     assert not plan.converged
     assert len(plan.word) <= 1
     assert 0.1 < plan.error <= np.pi / 2
-    assert apart(plan.rotation, far) == pytest.approx(plan.error)
+    assert apart(plan.rotation[None], far[None]) == pytest.approx(plan.error)
+
+
+def test_a_planar_robot_turns_in_its_plane_only():
+    """Elsewhere the closest plan is to do nothing."""
+    robot = robots.planar(4)
+    out_of_plane = Rotation.from_rotvec([0.5, 0, 0]).as_matrix()
+    plan = reojax.plan(robot, out_of_plane, **LIMITS, max_manoeuvres=2)
+    assert not plan.converged
+    assert plan.error == pytest.approx(0.5)
 
 
 def test_less_travel_when_travel_counts():
@@ -132,8 +133,8 @@ def test_replan_goes_from_what_was_measured():
     target, measured = Rotation.random(2, random_state=7).as_matrix()
     plan = reojax.replan(ROBOT, target, measured, **LIMITS, max_manoeuvres=5)
     assert plan.converged
-    end = measured @ np.asarray(reojax.net_rotation(ROBOT, reojax.polygon(plan.waypoints)))
-    assert apart(end, target) < 3e-9
+    end = measured @ replay(ROBOT, plan.waypoints[None])
+    assert apart(end, target[None]) < 3e-9
 
 
 @pytest.mark.parametrize("count", [1.0, 7.0])

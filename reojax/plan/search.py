@@ -58,7 +58,8 @@ def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Found:
     nothing = _nothing(x)
     start = (0, x, x, nothing, jnp.full_like(nothing.square, 1.5), jnp.stack([nothing.square] * 2))
     _, x, _, at, _, before = jax.lax.while_loop(going, body, start)
-    return Found(x, at.square, (at.square > _SOLVED) & (at.square < _STALLED * before[1]))
+    alone = (word.letter >= 0).sum(0) == 1
+    return Found(x, at.square, (at.square > _SOLVED) & (alone | (at.square < _STALLED * before[1])))
 
 
 @partial(jax.jit, static_argnums=4)
