@@ -1,6 +1,6 @@
 """What does the thesis's drop tower ask of robot, motors and controllers, and what would the cameras see?
 
-    python experiments/drop_tower.py --out out          # 4 to 8 minutes on 2 cores; --quick: half a one
+    python experiments/drop_tower.py --out out          # 2 to 8 minutes on 2 cores; --quick: half a one
 
 The whole story of thesis 1.8 in one run: the fall, the plan, least times and figure 3.2, joints under control in closed
 loop, an imperfect release, and a capture beside the simulation. Its sections are the modules `_drop_tower_*.py`. One

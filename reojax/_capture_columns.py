@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-SECONDS = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6}
+SECONDS = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 RADIANS = {"rad": 1.0, "radians": 1.0, "deg": math.pi / 180, "degrees": math.pi / 180, "\u00b0": math.pi / 180}
 QUATERNION = ("qw", "qx", "qy", "qz")
 ZXZ = ("zxz1", "zxz2", "zxz3")
@@ -65,7 +65,7 @@ def read_header(cells: Sequence[str], joint_names: Sequence[str], angle_unit: st
         raise ValueError(f"there is no column 'time'; the columns are {_listed(cells)}.")
     unit = units["time"] or "s"
     if unit not in SECONDS:
-        raise ValueError(f"column {cells[found['time']]!r} has the unit {unit!r}; time is in s, ms or us.")
+        raise ValueError(f"column {cells[found['time']]!r} has the unit {unit!r}; time is in s, ms, us or ns.")
     joints = _all_or_none(found, [f"theta{k + 1}" for k in range(len(joint_names))], cells, joint_names)
     quaternion, zxz = _all_or_none(found, QUATERNION, cells), _all_or_none(found, ZXZ, cells)
     if quaternion and zxz:

@@ -29,6 +29,8 @@ from reojax.robot import Robot
 UNIT_TOLERANCE = 0.02
 """Largest difference of a quaternion's length from 1; within it the quaternion is normalised."""
 _GAPS = {"", "nan", "na", "n/a", "null", "none"}
+_LATEST = 1e11
+"""Largest time that can be meant [s]; clocks that count from 1970 stand at 1.8e9."""
 
 
 class Capture(NamedTuple):
@@ -127,6 +129,11 @@ def read_capture(path: str | os.PathLike[str], robot: Robot, *, angle_unit: str 
             when = _number(cells[columns.time], "time") * columns.to_seconds
             if math.isnan(when):
                 raise ValueError("the time is missing.")
+            if abs(when) > _LATEST:
+                raise ValueError(
+                    f"the time is {when:g} s, beyond reason (more than {_LATEST:g} s); its header may name "
+                    "another unit, as in 'time [ns]'."
+                )
             if time and when <= time[-1]:
                 raise ValueError(
                     f"the time is {when:g} s, after {time[-1]:g} s; times must increase from line to line."

@@ -103,7 +103,7 @@ JOINTS = "time,theta1_rad,theta2_rad,theta3_rad"
         (csv(JOINTS + ",bend_deg", "0,0,0,0,0"), "columns 'theta2_rad' and 'bend_deg' are the same quantity"),
         (csv("time,qw,qx,qy,qz,zxz1_deg,zxz2_deg,zxz3_deg", "0"), "the orientation is there twice"),
         (csv("time,theta1_s,theta2_rad,theta3_rad", "0,0,0,0"), "the unit 's'; angles are in deg or rad"),
-        (csv("time_deg,theta1_rad,theta2_rad,theta3_rad", "0,0,0,0"), "the unit 'deg'; time is in s, ms or us"),
+        (csv("time_deg,theta1_rad,theta2_rad,theta3_rad", "0,0,0,0"), "the unit 'deg'; time is in s, ms, us or ns"),
         (
             csv("# c", JOINTS, "0,0,0,0", "1,0,zero,0"),
             "line 4: joint angle 'bend' is 'zero'; it must be a finite number",
@@ -112,6 +112,7 @@ JOINTS = "time,theta1_rad,theta2_rad,theta3_rad"
         (csv(JOINTS, "0,0,0,0", "soon,0,0,0"), "line 3: time is 'soon'"),
         (csv(JOINTS, "0,0,0,0", ",0,0,0"), "line 3: the time is missing"),
         (csv(JOINTS, "0,0,0,0", "2,0,0,0", "1,0,0,0"), "line 4: the time is 1 s, after 2 s; times must increase"),
+        (csv(JOINTS, "1.8e12,0,0,0", "1.9e12,0,0,0"), r"line 2: the time is 1.8e\+12 s, beyond reason"),
         (csv(JOINTS, "0,0,0,0", "0,0,0,0"), "line 3: the time is 0 s, after 0 s"),
         (csv(JOINTS, "0,0,0,0", "1,0,0"), "line 3: the line has 3 cells; the header has 4"),
         (csv(JOINTS, "0,0,0,0", "1,270,0,0"), "line 3: joint angle 'twist1' is 270 rad, beyond reason .* in degrees"),

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import reojax
 from reojax import FreePaths, free_path, free_paths, robots
+from reojax.cli import main
 
 LIMITS = {"twist_limit": float(np.deg2rad(270)), "bend_limit": float(np.deg2rad(120))}
 FEW = {"corners": 5, "starts": 2, "max_steps": 60}
@@ -57,6 +58,23 @@ def test_travel_is_little(found):
     assert found.travel[1] < 0.3
     np.testing.assert_array_equal(found.waypoints[3], 0)
     assert found.travel[3] == 0
+
+
+def test_the_command_line(capsys, monkeypatch, tmp_path):
+    """A small turn, which takes a small loop: corners in the table, path in the file, a picture."""
+    monkeypatch.setenv("REOJAX_CACHE", "0")
+    picture, table = tmp_path / "a.svg", tmp_path / "a.csv"
+    options = ["--corners", "5", "--out", str(picture), "--csv", str(table)]
+    assert main(["plan", "--vocabulary", "free", "--target", "rotvec 0 0 2", *options]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("Closed path for rotvec 0 0 2 on prototype\n")
+    assert "reached, to" in out
+    assert picture.read_text().lstrip().startswith("<?xml")
+    corners = np.loadtxt(table, delimiter=",", skiprows=1)
+    assert len(corners) == 7
+    np.testing.assert_array_equal(corners[[0, -1]], 0)
+    turned = reojax.net_rotation(ROBOT, reojax.polygon(np.deg2rad(corners)))
+    np.testing.assert_allclose(turned, Rotation.from_rotvec([0, 0, np.deg2rad(2)]).as_matrix(), atol=1e-8)
 
 
 def test_what_cannot_be_reached_ends_closest_and_says_so():

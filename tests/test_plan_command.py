@@ -1,6 +1,8 @@
 """`reojax plan`: files that replay, exit statuses, one line for a bad target; the words of many small loops."""
 
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,9 @@ import reojax
 from reojax import robots
 from reojax.cli import main
 from reojax.cli.plan import read_target
+
+sys.path.append(str(Path(__file__).parent.parent / "experiments"))
+from _replay import replay
 
 QUARTER = Rotation.from_rotvec([0, np.pi / 2, 0]).as_matrix()
 
@@ -30,8 +35,7 @@ def test_the_files_replay(capsys, tmp_path):
     assert table.read_text().splitlines()[0] == "twist1 [deg],bend [deg],twist2 [deg]"
     corners = np.deg2rad(np.loadtxt(table, delimiter=",", skiprows=1))
     np.testing.assert_allclose(corners, report["waypoints_rad"], atol=1e-10)
-    turned = reojax.net_rotation(robots.prototype(), reojax.polygon(corners))
-    np.testing.assert_allclose(turned, QUARTER, atol=1e-8)
+    np.testing.assert_allclose(replay(robots.prototype(), corners[None])[0], QUARTER, atol=1e-8)
 
 
 def test_not_reached_is_status_1_with_the_closest_plan(capsys):
@@ -105,8 +109,7 @@ def test_small_loops_many_times_over():
     assert 5 < plan.manoeuvres.min()
     assert plan.manoeuvres.max() <= 400
     assert np.abs(plan.waypoints).max() <= limit + 1e-9
-    turned = reojax.net_rotation(robot, reojax.polygon(plan.waypoints[0]), steps=1)
-    np.testing.assert_allclose(turned, targets[0], atol=1e-8)
+    np.testing.assert_allclose(replay(robot, plan.waypoints), targets, atol=1e-8)
     few = reojax.plan(robot, targets[0], twist_limit=limit, bend_limit=limit, max_manoeuvres=20)
     assert not few.converged
     assert len(few.word) <= 20

@@ -1,4 +1,4 @@
-"""Find manoeuvres that end on a target orientation; exit status 1 if it is not reached."""
+"""Find manoeuvres, or a closed path, that end on a target orientation; exit status 1 if it is not reached."""
 
 import argparse
 import json
@@ -10,7 +10,7 @@ from reojax.cli._arguments import BadInput, degrees, version
 if TYPE_CHECKING:
     import numpy as np
 
-    from reojax.plan import Plan
+    from reojax.plan import FreePaths, Plan
     from reojax.robot import Robot
 
 _KINDS = {"rotvec": 3, "zxz": 3, "quat": 4}
@@ -30,8 +30,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--max-manoeuvres", type=int, default=5, metavar="N", help="manoeuvres allowed [%(default)d]")
     parts = "count: fewest manoeuvres; travel: least joint travel [%(default)s]"
     add("--objective", choices=("count", "travel"), default="count", help=parts)
-    words = "manoeuvres: A and B; rectangles: each distal joint its own amplitude [%(default)s]"
-    add("--vocabulary", choices=("manoeuvres", "rectangles"), default="manoeuvres", help=words)
+    words = "manoeuvres: A and B; rectangles: each distal joint its own amplitude; free: one closed path of little"
+    words += " joint travel, whatever --max-manoeuvres and --objective say [%(default)s]"
+    add("--vocabulary", choices=("manoeuvres", "rectangles", "free"), default="manoeuvres", help=words)
+    add("--corners", type=int, default=8, metavar="N", help="free corners of a free path [%(default)d]")
     add("--json", action="store_true", help="print one JSON object, with all digits")
     add("--out", metavar="FIGURE", help="draw the orientation on its way to a .png, .pdf or .svg")
     add("--animate", metavar="GIF", help="draw the robot on its way to a .gif")
@@ -51,7 +53,7 @@ def run(args: argparse.Namespace) -> None:
         _write_files(robot, plan, target, args)
     except ValueError as error:
         raise BadInput(f"reojax plan: {error}") from error
-    report = _report(plan, target, args)
+    report = _report(robot, plan, target, args)
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(report))
     if not plan.converged:
         raise SystemExit(1)
@@ -123,23 +125,27 @@ def _check_files(args: argparse.Namespace) -> None:
         check_writable(args.csv)
 
 
-def _plan(robot: "Robot", target: "np.ndarray", args: argparse.Namespace) -> "Plan":
+def _plan(robot: "Robot", target: "np.ndarray", args: argparse.Namespace) -> "Plan | FreePaths":
     import numpy as np
 
-    from reojax.plan import plan
+    from reojax.plan import free_path, plan
 
+    twist_limit, bend_limit = float(np.deg2rad(args.twist_limit)), float(np.deg2rad(args.bend_limit))
+    if args.vocabulary == "free":
+        limits = {"twist_limit": twist_limit, "bend_limit": bend_limit}
+        return free_path(robot, target, **limits, corners=args.corners, progress=True)
     return plan(
         robot,
         target,
-        twist_limit=float(np.deg2rad(args.twist_limit)),
-        bend_limit=float(np.deg2rad(args.bend_limit)),
+        twist_limit=twist_limit,
+        bend_limit=bend_limit,
         max_manoeuvres=args.max_manoeuvres,
         objective=args.objective,
         vocabulary=args.vocabulary,
     )
 
 
-def _write_files(robot: "Robot", plan: "Plan", target: "np.ndarray", args: argparse.Namespace) -> None:
+def _write_files(robot: "Robot", plan: "Plan | FreePaths", target: "np.ndarray", args: argparse.Namespace) -> None:
     import numpy as np
 
     from reojax._output import replacing
@@ -149,7 +155,7 @@ def _write_files(robot: "Robot", plan: "Plan", target: "np.ndarray", args: argpa
         rows += [",".join(f"{angle:.12g}" for angle in corner) for corner in np.rad2deg(plan.waypoints)]
         with replacing(args.csv) as file:
             file.write(("\n".join(rows) + "\n").encode())
-    if not len(plan.word):  # nothing moves, so there is nothing to draw
+    if not plan.travel:  # nothing moves, so there is nothing to draw
         return
     if args.out is not None:
         from reojax import plot
@@ -163,11 +169,14 @@ def _write_files(robot: "Robot", plan: "Plan", target: "np.ndarray", args: argpa
         plot.animation(robot, path, args.animate, frames=_FRAMES, seconds=0.4 * min(path.edges, 60))
 
 
-def _report(plan: "Plan", target: "np.ndarray", args: argparse.Namespace) -> dict[str, Any]:
+def _report(robot: "Robot", plan: "Plan | FreePaths", target: "np.ndarray", args: argparse.Namespace) -> dict[str, Any]:
     import numpy as np
 
-    drawn = len(plan.word) > 0
-    parts = zip(plan.word, np.rad2deg(plan.twist), np.rad2deg(plan.bend), np.rad2deg(plan.last_twist), strict=True)
+    from reojax.plan import Plan
+
+    drawn = plan.travel > 0
+    loops = (plan.word, plan.twist, plan.bend, plan.last_twist) if isinstance(plan, Plan) else ((), (), (), ())
+    parts = zip(loops[0], *map(np.rad2deg, loops[1:]), strict=True)
     return {
         "command": "plan",
         "version": version(),
@@ -179,7 +188,9 @@ def _report(plan: "Plan", target: "np.ndarray", args: argparse.Namespace) -> dic
             "max_manoeuvres": args.max_manoeuvres,
             "objective": args.objective,
             "vocabulary": args.vocabulary,
+            "corners": args.corners,
         },
+        "joints": list(robot.joint_names),
         "target_matrix": target.tolist(),
         "manoeuvres": [
             {"name": name, "twist_deg": float(t), "bend_deg": float(b), "last_twist_deg": float(last)}
@@ -198,21 +209,40 @@ def _report(plan: "Plan", target: "np.ndarray", args: argparse.Namespace) -> dic
 
 
 def _text(report: dict[str, Any]) -> str:
-    config, loops = report["config"], report["manoeuvres"]
-    lines = [f"Plan for {config['target']} on {config['robot']}: {len(loops)} manoeuvres", ""]
-    if loops:
-        lines.append(f"{'':>6}  {'twist [deg]':>12}{'bend [deg]':>12}{'last twist [deg]':>18}")
+    title = f"{report['config']['target']} on {report['config']['robot']}"
+    free = report["config"]["vocabulary"] == "free"
+    if free and report["travel_deg"]:
+        lines = [f"Closed path for {title}", "", *_corners(report)]
+    elif report["manoeuvres"]:
+        lines = [f"Plan for {title}: {len(report['manoeuvres'])} manoeuvres", "", *_loops(report["manoeuvres"])]
+    else:
+        lines = [f"Plan for {title}: 0 manoeuvres", "", "nothing to do"]
+    lines += ["", f"joint travel {report['travel_deg']:.1f} deg"]
+    error = f"{report['error_rad']:.1e} rad"
+    if report["converged"]:
+        lines.append(f"reached, to {error}")
+    else:
+        what = "path" if free else "plan"
+        lines.append(f"NOT reached: {report['error_deg']:.4f} deg ({error}) are left; this is the closest {what}")
+    lines += [f"{what} in {report[what]}" for what in ("picture", "animation", "csv") if report[what] is not None]
+    return "\n".join(lines)
+
+
+def _loops(loops: list[dict[str, Any]]) -> list[str]:
+    lines = [f"{'':>6}  {'twist [deg]':>12}{'bend [deg]':>12}{'last twist [deg]':>18}"]
     for loop in loops[:_TOLD]:
         cells = (loop["twist_deg"], loop["bend_deg"], loop["last_twist_deg"])
         first, second, third = (round(cell, 6) + 0.0 for cell in cells)
         lines.append(f"{loop['name']:>6}  {first:12.6f}{second:12.6f}{third:18.6f}")
     if len(loops) > _TOLD:
         lines.append(f"{'...':>6}  and {len(loops) - _TOLD} more; --json and --csv have them")
-    lines += ["" if loops else "nothing to do", f"joint travel {report['travel_deg']:.1f} deg"]
-    error = f"{report['error_rad']:.1e} rad"
-    if report["converged"]:
-        lines.append(f"reached, to {error}")
-    else:
-        lines.append(f"NOT reached: {report['error_deg']:.4f} deg ({error}) are left; this is the closest plan")
-    lines += [f"{what} in {report[what]}" for what in ("picture", "animation", "csv") if report[what] is not None]
-    return "\n".join(lines)
+    return lines
+
+
+def _corners(report: dict[str, Any]) -> list[str]:
+    import numpy as np
+
+    lines = [f"{'corner':>6}  " + "".join(f"{name + ' [deg]':>16}" for name in report["joints"])]
+    for number, corner in enumerate(np.rad2deg(report["waypoints_rad"]).round(6) + 0.0):
+        lines.append(f"{number:6}  " + "".join(f"{angle:16.6f}" for angle in corner))
+    return lines

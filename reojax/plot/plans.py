@@ -8,7 +8,7 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from reojax._arrays import Array
 from reojax.holonomy import rotation_history
 from reojax.path import polygon
-from reojax.plan import Plan
+from reojax.plan import FreePaths, Plan
 from reojax.plot._style import GREY, INK, PALE, dress
 from reojax.plot.history import draw_joints
 from reojax.robot import Robot
@@ -20,8 +20,10 @@ _NAMED = 12
 """Most manoeuvres that are named under the picture."""
 
 
-def plan_figure(robot: Robot, plan: Plan, target: Float[Array, "3 3"], *, title: str | None = None) -> Figure:
-    """Draw a plan for one target.
+def plan_figure(
+    robot: Robot, plan: Plan | FreePaths, target: Float[Array, "3 3"], *, title: str | None = None
+) -> Figure:
+    """Draw a plan or a free closed path for one target.
 
     Left, the unit sphere in inertial directions with the track of the base's z axis, roll on the named robots; short
     lines show its axes x, y, z at the end, rings where the target wants them. Right, the angle left to the target and
@@ -29,9 +31,9 @@ def plan_figure(robot: Robot, plan: Plan, target: Float[Array, "3 3"], *, title:
 
     Args:
         robot: the robot.
-        plan: a plan for one target, of one manoeuvre or more.
+        plan: a plan for one target, of one manoeuvre or more, or a free path.
         target: (3, 3) the rotation it was made for.
-        title: default the word.
+        title: default the word, or "closed path".
 
     Raises:
         ValueError: if the plan has no manoeuvre, or is for many targets.
@@ -59,12 +61,14 @@ def plan_figure(robot: Robot, plan: Plan, target: Float[Array, "3 3"], *, title:
     above.set_ylim(0, None)
     draw_joints(below, robot, path)
     below.set_xlabel("along the path, edge by edge", color=INK)
-    if len(plan.word) <= _NAMED:
-        start = (path.edges - 4 * len(plan.word)) / 2  # the feet may fold first
-        below.set_xticks(start + 4 * np.arange(len(plan.word)) + 2, [str(letter) for letter in plan.word])
-        below.tick_params(axis="x", length=0)
-        below.set_xlabel("manoeuvres", color=INK)
-    short = "-".join(plan.word) if len(plan.word) <= _NAMED else f"{len(plan.word)} loops"
+    short = "closed path"
+    if isinstance(plan, Plan):
+        short = "-".join(plan.word) if len(plan.word) <= _NAMED else f"{len(plan.word)} loops"
+        if len(plan.word) <= _NAMED:
+            start = (path.edges - 4 * len(plan.word)) / 2  # the feet may fold first
+            below.set_xticks(start + 4 * np.arange(len(plan.word)) + 2, [str(letter) for letter in plan.word])
+            below.tick_params(axis="x", length=0)
+            below.set_xlabel("manoeuvres", color=INK)
     figure.suptitle(title or f"{robot.name}: {short}", fontsize=13, fontweight="bold", color=INK)
     return figure
 
