@@ -158,13 +158,13 @@ def orientation_along(
         both = solve_symmetric3(A, jnp.concatenate([(B @ theta_dot)[:, None], jnp.eye(3, dtype=dtype)], axis=1))
         return both[:, 0], both[:, 1:]
 
-    flat = jax.tree.map(lambda leaf: leaf.reshape(-1, robot.joints), state)
+    flat = jax.tree.map(lambda leaf: leaf.reshape(within.size, robot.joints), state)
     own, mobility = jax.vmap(turning)(flat.theta, flat.theta_dot)
     steps = trajectory.pieces * samples
     step = jnp.repeat(length / samples, samples)
     rotation = orientations(step, own.reshape(steps, -1, 3), mobility.reshape(steps, -1, 3, 3), momentum)
     time = jnp.append((trajectory.breaks[:-1, None] + within[:, :, 0]).ravel(), trajectory.breaks[-1])
-    sampled = jax.tree.map(lambda leaf: _samples(leaf.reshape(steps, -1, robot.joints)), state)
+    sampled = jax.tree.map(lambda leaf: _samples(leaf.reshape(steps, within.shape[2], robot.joints)), state)
     return rotation, time, sampled
 
 
@@ -178,6 +178,6 @@ def net_rotation_of(robot: Robot, trajectory: Trajectory, samples: int) -> Float
     shares = jnp.asarray((np.arange(samples)[:, None] + np.array(GAUSS)) / samples, length.dtype)
     within = shares[None] * length[:, None, None]
     state = jax.vmap(jax.vmap(jax.vmap(polynomial, (None, 0)), (None, 0)))(trajectory.coefficients, within)
-    theta, rate = (leaf.reshape(-1, robot.joints) for leaf in state[:2])
+    theta, rate = (leaf.reshape(within.size, robot.joints) for leaf in state[:2])
     omega = jax.vmap(lambda theta, rate: base_velocity(robot, theta, rate))(theta, rate)
     return end_rotation(jnp.repeat(length / samples, samples), omega.reshape(-1, 3, 3))

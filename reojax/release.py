@@ -212,7 +212,7 @@ def _nodes(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Arr
         both = solve_symmetric3(A, columns)
         return _Node(both[:, 0], both[:, 1:], robot.com[0] - kinematics(robot, theta).centre[0])
 
-    nodes = jax.vmap(node)(*(leaf.reshape(-1, robot.joints) for leaf in (state.theta, state.theta_dot)))
+    nodes = jax.vmap(node)(*(leaf.reshape(within.size, robot.joints) for leaf in (state.theta, state.theta_dot)))
     count = trajectory.pieces * steps
     length = jnp.repeat(piece / steps, steps)
     time = jnp.append((trajectory.breaks[:-1, None] + within[:, :, 0]).ravel(), trajectory.breaks[-1])

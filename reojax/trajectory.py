@@ -96,7 +96,7 @@ def along(path: Path, law: Law | str, durations: ArrayLike) -> Trajectory:
     pieces = pieces.at[:, :, 0].add(points[:-1, None])
     start = jnp.concatenate([jnp.zeros(1, dtype), jnp.cumsum(times)])
     inner = start[:-1, None] + times[:, None] * breaks[None, :-1]
-    return Trajectory(jnp.concatenate([inner.ravel(), start[-1:]]), pieces.reshape(-1, *pieces.shape[2:]))
+    return Trajectory(jnp.concatenate([inner.ravel(), start[-1:]]), pieces.reshape(inner.size, *pieces.shape[2:]))
 
 
 def through(path: Path, durations: ArrayLike) -> Trajectory:

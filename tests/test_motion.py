@@ -89,6 +89,17 @@ def test_a_still_robot_that_spins():
     assert np.abs(motion.torque).max() < 1e-12
 
 
+def test_a_robot_without_joints_is_a_free_rigid_body():
+    """Its kinetic energy stays, as its momentum does; at rest it stays put."""
+    robot, path = random_robot(0, 0), reojax.polygon(np.zeros((2, 0)))
+    motion = reojax.simulate(robot, path, durations=2.0, momentum=[0.01, 0, 0])
+    energy = np.einsum("ma,ab,mb->m", motion.omega, np.asarray(robot.inertia[0]), motion.omega)
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-11)
+    assert so3.angle(motion.rotation[-1]) > 0.5
+    still = reojax.released(robot, reojax.along(path, "quintic", 1.0))
+    np.testing.assert_array_equal(still.rotation[-1], np.eye(3))
+
+
 def test_the_order_is_six():
     """Halving the step takes the error to a sixty-fourth, of a robot that spins while it moves."""
     ends = [
