@@ -1,4 +1,4 @@
-"""What both commands have in common: options, settings, errors, and a description of the machine."""
+"""What all commands have in common: options, settings, errors, and a description of the machine."""
 
 import argparse
 import os
@@ -22,7 +22,7 @@ PACKAGES = (
 
 
 def options(doc: str | None) -> argparse.ArgumentParser:
-    """Parser with the options that both commands have; `doc` is the command's docstring."""
+    """Parser with the options that all commands have; `doc` is the command's docstring."""
     summary, _, rest = (doc or "").partition("\n")
     parser = argparse.ArgumentParser(
         description=summary, epilog=rest, formatter_class=argparse.RawDescriptionHelpFormatter
