@@ -19,7 +19,8 @@ from reojax.plan.loops import Table, read
 _SOLVED = 1e-14
 """Squared residual [rad^2] at which the search on the table stops; the true rotations take over."""
 _STALLED = 0.9
-"""Part of the squared residual that two steps must leave for more steps to be tried; what will arrive is faster."""
+"""Part of the squared residual that two steps must leave for more steps to be tried; what will arrive is faster.
+Single loops, which have fewer amplitudes than a rotation has angles, may be slow and go on."""
 _FEASIBLE = 1e-10
 """Squared residual up to which a shortened word still counts as on the target."""
 
