@@ -28,7 +28,7 @@ from reojax._fast.product import Triple, ordered_products, rotate, times, to_mat
 from reojax._fast.scalar import cross, plus, times as scale
 from reojax._fast.sincos import sincos
 from reojax._fast.steps import Step, mean_over_step, step_rotations
-from reojax._fast.store import keeper
+from reojax._fast.store import keep
 
 
 class Problem(NamedTuple):
@@ -53,8 +53,8 @@ class Problem(NamedTuple):
 def steps_of_path(robot: Components, points: jax.Array, steps: int) -> Step:
     """Rotation over each of the `steps` steps of each edge, in order."""
     theta, rate = path_nodes(points, steps)
-    base = inward(robot, [sincos(a) for a in theta], rate, keeper(theta[0]))
-    return step_rotations(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0]))
+    base = inward(robot, [sincos(a) for a in theta], rate)
+    return step_rotations(keep(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0])))
 
 
 def end_rotation(robot: Components, points: jax.Array, steps: int) -> jax.Array:
@@ -99,11 +99,11 @@ def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax
     """How the end turns, seen from the start, with changes of the data and of the path."""
     data = _apart(numbers)
     theta, rate = path_nodes(points, problem.steps)
-    keep = keeper(theta[0])
     sine_cosine = [keep(sincos(angle)) for angle in theta]
-    base = inward(problem.robot(data), sine_cosine, rate, keep)
-    base = Base(*(keep(part) for part in base))
-    omega = _at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0])
+    base = inward(problem.robot(data), sine_cosine, rate)
+    moving = keep((*base.momentum, *base.drift))
+    base = Base(keep(base.inertia), moving[:3], keep(base.centre), moving[3:])
+    omega = keep(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0]))
     step = step_rotations(omega)
     _, before = ordered_products(step.rotation)
     velocity = scale(-1, plus(base.drift, cross(omega, base.centre)))
@@ -112,10 +112,8 @@ def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax
         now = [to_nodes(value, theta[0]) for value in data]
         for i, value in zip(problem.varied, varied, strict=True):
             now[i] = to_nodes(value, theta[0])
-        theta_, rate_ = (keep(values) for values in path_nodes(points, problem.steps))
-        of_all = angular_momentum(
-            problem.robot(now), [sincos(a) for a in theta_], rate_, omega, velocity, base.centre, keep
-        )
+        theta_, rate_ = path_nodes(points, problem.steps)
+        of_all = angular_momentum(problem.robot(now), [sincos(a) for a in theta_], rate_, omega, velocity, base.centre)
         return _at_nodes(of_all, theta[0])
 
     given = iter(changes)
@@ -123,8 +121,8 @@ def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax
     by_points = next(given) if problem.moved else jnp.zeros_like(points)
     _, change = jax.jvp(momentum, ([data[i] for i in problem.varied], points), (by_data, by_points))
     change_of_omega = _at_nodes(solve(base.inertia, scale(-1, change)), theta[0])
-    in_step = mean_over_step(step.inside(keep(change_of_omega), keep))
-    in_step = keeper(step.half[0])(in_step)
+    in_step = mean_over_step(step.inside(keep(change_of_omega)))
+    in_step = keep(in_step)
     x, y, z = (c.sum() for c in rotate(times(before, step.half), in_step))
     return [jnp.stack([x, y, z])]
 

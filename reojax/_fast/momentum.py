@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from reojax._fast.components import Components
 from reojax._fast.omega import apply_symmetric, joint_rotation
 from reojax._fast.scalar import Scalar, Vector, apply, cross, mul, plus, times, transpose
-from reojax._fast.store import Keep
+from reojax._fast.store import keep
 
 
 def angular_momentum(
@@ -19,7 +19,6 @@ def angular_momentum(
     omega: Vector,
     velocity: Vector,
     centre: Vector,
-    keep: Keep,
 ) -> Vector:
     """Angular momentum about the point `centre` (base frame) when the base moves with `omega` and `velocity`.
 
@@ -33,8 +32,10 @@ def angular_momentum(
     w, v = [omega], [velocity]
     for k in joints:
         outward, parent = transpose(E[k]), robot.parent[k]
-        w.append(keep(plus(apply(outward, w[parent]), times(rate[k], robot.axis[k]))))
-        v.append(keep(apply(outward, plus(v[parent], cross(w[parent], robot.anchor[k])))))
+        spin = plus(apply(outward, w[parent]), times(rate[k], robot.axis[k]))
+        moving = keep((*spin, *apply(outward, plus(v[parent], cross(w[parent], robot.anchor[k])))))
+        w.append(moving[:3])
+        v.append(moving[3:])
     p = [plus(times(m, v_), cross(w_, f)) for m, f, v_, w_ in zip(robot.mass, robot.moment, v, w, strict=True)]
     h = [
         plus(apply_symmetric(J, w_), cross(f, v_))
@@ -42,8 +43,9 @@ def angular_momentum(
     ]
     for k in reversed(joints):
         link, parent = k + 1, robot.parent[k]
-        push = apply(E[k], keep(p[link]))
+        carried = keep((*p[link], *h[link]))
+        push = apply(E[k], carried[:3])
         rotor = times(mul(rate[k], robot.rotor_spin[k]), robot.axis[k])
         p[parent] = plus(p[parent], push)
-        h[parent] = plus(h[parent], plus(plus(apply(E[k], keep(h[link])), rotor), cross(robot.anchor[k], push)))
+        h[parent] = plus(h[parent], plus(plus(apply(E[k], carried[3:]), rotor), cross(robot.anchor[k], push)))
     return plus(h[0], times(-1, cross(centre, p[0])))

@@ -35,7 +35,7 @@ from reojax._fast.scalar import (
     times,
 )
 from reojax._fast.sincos import sincos
-from reojax._fast.store import Keep, keeper
+from reojax._fast.store import keep
 
 _KEPT = 4
 """Joints from one kept link to the next."""
@@ -56,11 +56,11 @@ class Base(NamedTuple):
 
 def omega(robot: Components, theta: Sequence[jax.Array], rate: Sequence[jax.Array]) -> Vector:
     """Angular velocity of the base, base frame, at joint angles `theta` and `rate`, arrays of one shape."""
-    base = inward(robot, [sincos(angle) for angle in theta], rate, keeper(theta[0]))
+    base = inward(robot, [sincos(angle) for angle in theta], rate)
     return solve(base.inertia, times(-1, base.momentum))
 
 
-def inward(robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate: Sequence[Scalar], keep: Keep) -> Base:
+def inward(robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate: Sequence[Scalar]) -> Base:
     """Gather inertia and momentum from the tips to the base; `keep` (`store`) what every fourth joint hands on.
 
     Without, XLA computes long chains again for every value they end in: compile time grows with their square or worse.
@@ -81,7 +81,8 @@ def inward(robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate
         f[parent] = plus(f[parent], plus(moment, times(m[link], a)))
         m[parent] = add(m[parent], m[link])
         if k and k % _KEPT == 0:
-            p[parent], h[parent], J[parent], f[parent] = (keep(v[parent]) for v in (p, h, J, f))
+            moving = keep((*p[parent], *h[parent]))
+            p[parent], h[parent], J[parent], f[parent] = moving[:3], moving[3:], keep(J[parent]), keep(f[parent])
     centre, drift = times(1 / m[0], f[0]), times(1 / m[0], p[0])
     return Base(
         inertia=plus(J[0], times(-1, point_inertia(m[0], centre))),

@@ -28,7 +28,7 @@ import numpy as np
 from reojax._fast.nodes import LEGENDRE, NODES, WEIGHTS, per_step
 from reojax._fast.product import Quaternion, Triple, times
 from reojax._fast.sincos import horner, sincos
-from reojax._fast.store import Keep, keeper
+from reojax._fast.store import keep
 
 _MOMENTS = WEIGHTS[:, None] * LEGENDRE[:, :6]
 """values (steps, 8) @ _MOMENTS = integrals of the values times the first six Legendre polynomials."""
@@ -84,7 +84,7 @@ class Step(NamedTuple):
     """Over the whole step, four arrays (steps,)."""
     half: Quaternion
     """`exp(wbar / 2)`, four arrays (steps,)."""
-    inside: Callable[[Triple, Keep], Triple]
+    inside: Callable[[Triple], Triple]
     """Turns vectors at the nodes by `P(s) exp(U(s)) exp((s - 1/2) wbar)`, keeping what is in between."""
 
 
@@ -96,17 +96,16 @@ def step_rotations(omega: Triple) -> Step:
     """
     s = jnp.asarray(np.tile(NODES - 0.5, omega[0].shape[0] // len(NODES)), omega[0].dtype)
     mean = _at_nodes(omega, _MEAN_AT_NODES)
-    u = _rotate(_combine((s, mean)), _combine((1.0, omega), (-1.0, mean)))
+    u = keep(_rotate(_combine((s, mean)), _combine((1.0, omega), (-1.0, mean))))
     turned = _at_nodes(u, _INTEGRAL)
-    v = _fer(u, turned)
+    v = keep(_fer(u, turned))
     m = _moments(v, _MOMENTS.shape[1])
     first = _combine((1.0, m[0]), *((0.5, _cross(a, b)) for a, b in pairwise(m)))
-    keep = keeper(m[0][0])
     half = keep(_exp(_combine((0.5, _moments(omega, 1)[0]))))
     inner = keep(times(_exp_small(first), _exp_small(_moments(u, 1)[0])))
     rotation = keep(times(times(half, inner), half))
 
-    def inside(vectors: Triple, keep: Keep) -> Triple:
+    def inside(vectors: Triple) -> Triple:
         for turn in (_combine((s, mean)), turned, _at_nodes(v, _INTEGRAL)):
             vectors = keep(_rotate(turn, vectors))
         return vectors
