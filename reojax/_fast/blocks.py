@@ -18,7 +18,11 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
 _BYTES = 2**17
-"""Of one intermediate value of a block. (Smaller blocks were no faster; the loop has its costs.)"""
+"""Of one intermediate value of a block. (Smaller blocks were no faster; the loop has its costs.)
+
+The number of designs in a block is made odd: arrays whose size is a power of two begin at the same place of the cache,
+and some ten that are read side by side drive one another out; a gradient took 1.3 times as long.
+"""
 
 
 class Call(NamedTuple):
@@ -55,7 +59,8 @@ def _block_by_block(*args, call: Call, batched: tuple[bool, ...], size: int | No
     if size is None or size < 2 * block:
         return _whole(*args, call=call, batched=batched, size=size)
     rounds = -(-size // block)
-    block = -(-size // rounds)
+    block = -(-size // rounds) | 1  # odd
+    rounds = -(-size // block)
     missing = rounds * block - size  # made up by repeating the last design
     many = [x for x, b in zip(args, batched, strict=True) if b]
     many = [jnp.concatenate([x, jnp.repeat(x[-1:], missing, axis=0)]) if missing else x for x in many]
