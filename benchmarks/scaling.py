@@ -1,6 +1,6 @@
 """How does the cost of a net rotation grow with designs, joints, corners and accuracy?
 
-    python benchmarks/scaling.py                    # about 17 minutes on 2 quiet cores; --quick is shorter
+    python benchmarks/scaling.py                    # 8 minutes on 2 quiet cores; --quick is shorter
 
 Writes scaling.json and scaling.png, one panel for each. Expected: a loop costs the same among a thousand as among
 millions, if they come in batches that fit the cache; cost grows no faster than linearly with joints, compilation

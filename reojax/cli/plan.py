@@ -132,8 +132,9 @@ def _plan(robot: "Robot", target: "np.ndarray", args: argparse.Namespace) -> "Pl
 
     twist_limit, bend_limit = float(np.deg2rad(args.twist_limit)), float(np.deg2rad(args.bend_limit))
     if args.vocabulary == "free":
-        limits = {"twist_limit": twist_limit, "bend_limit": bend_limit}
-        return free_path(robot, target, **limits, corners=args.corners, progress=True)
+        return free_path(
+            robot, target, twist_limit=twist_limit, bend_limit=bend_limit, corners=args.corners, progress=True
+        )
     return plan(
         robot,
         target,
