@@ -15,7 +15,7 @@ from jaxtyping import Float
 from reojax._arrays import Array, common_float
 from reojax._fast.components import Pattern, components, pattern_of
 from reojax._fast.endpoint import end_rotation, steps_of_path
-from reojax._fast.product import ordered_products, to_matrix
+from reojax._fast.product import products_up_to, to_matrix
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -91,11 +91,9 @@ def _rotation_history(robot: Robot, waypoints: Array, samples: int, pattern: Pat
     if not robot.joints or not edges:
         return jnp.tile(jnp.eye(3, dtype=points.dtype), (edges * samples + 1, 1, 1))
     finer = -(-DEFAULT_STEPS // samples)
-    end, before = ordered_products(
-        steps_of_path(components(robot, pattern, points.dtype), points, samples * finer).rotation
-    )
-    history = jax.vmap(to_matrix)(tuple(q[::finer] for q in before))
-    return jnp.concatenate([history, to_matrix(end)[None]])
+    step = steps_of_path(components(robot, pattern, points.dtype), points, samples * finer)
+    ends = tuple(q[finer - 1 :: finer] for q in products_up_to(step.rotation))
+    return jnp.concatenate([jnp.eye(3, dtype=points.dtype)[None], jax.vmap(to_matrix)(ends)])
 
 
 def _as_arrays(robot: Robot, waypoints: Array) -> tuple[Robot, jax.Array]:

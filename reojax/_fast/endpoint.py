@@ -22,13 +22,14 @@ from jax.custom_derivatives import SymbolicZero
 from reojax._fast.blocks import Call, in_blocks
 from reojax._fast.components import Components
 from reojax._fast.momentum import angular_momentum
-from reojax._fast.nodes import NODES, path_nodes, to_nodes
+from reojax._fast.nodes import NODES, path_nodes, sum_over_nodes, to_nodes
 from reojax._fast.omega import Base, inward, solve
-from reojax._fast.product import Triple, ordered_products, rotate, times, to_matrix
+from reojax._fast.product import Quaternion, Triple, inverse, product, products_up_to, rotate, shifted, times, to_matrix
 from reojax._fast.scalar import cross, plus, times as scale
 from reojax._fast.sincos import sincos
 from reojax._fast.steps import Step, mean_over_step, step_rotations
 from reojax._fast.store import keep
+from reojax._fast.virtual import slopes, together
 
 
 class Problem(NamedTuple):
@@ -91,48 +92,89 @@ def _nodes(problem: Problem, points: jax.Array) -> int:
 
 
 def _rotation(problem: Problem, numbers: jax.Array, points: jax.Array) -> list[jax.Array]:
-    total, _ = ordered_products(steps_of_path(problem.robot(_apart(numbers)), points, problem.steps).rotation)
-    return [to_matrix(total)]
+    return [to_matrix(product(steps_of_path(problem.robot(_apart(numbers)), points, problem.steps).rotation))]
 
 
-def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax.Array) -> list[jax.Array]:
-    """How the end turns, seen from the start, with changes of the data and of the path."""
-    data = _apart(numbers)
+class Solution(NamedTuple):
+    """What derivatives read of the solution, kept."""
+
+    theta: list[jax.Array]
+    rate: list[jax.Array]
+    sine_cosine: list[Any]
+    base: Base
+    omega: Triple
+    velocity: Any
+    """Of the base's origin, the centre of mass being at rest."""
+    step: Step
+    to_step: Quaternion
+    """Attitude in which `step.inside` begins, from the start of the path, four arrays (steps,)."""
+
+
+def _solution(problem: Problem, data: list[jax.Array], points: jax.Array) -> Solution:
     theta, rate = path_nodes(points, problem.steps)
     sine_cosine = [keep(sincos(angle)) for angle in theta]
     base = inward(problem.robot(data), sine_cosine, rate)
     moving = keep((*base.momentum, *base.drift))
     base = Base(keep(base.inertia), moving[:3], keep(base.centre), moving[3:])
     omega = keep(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0]))
-    step = step_rotations(omega)
-    _, before = ordered_products(step.rotation)
     velocity = scale(-1, plus(base.drift, cross(omega, base.centre)))
+    step = step_rotations(omega)
+    to_step = keep(times(shifted(products_up_to(step.rotation), 1), step.half))
+    return Solution(theta, rate, sine_cosine, base, omega, velocity, step, to_step)
+
+
+def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax.Array) -> list[jax.Array]:
+    """How the end turns, seen from the start, with changes of the data and of the path."""
+    data = _apart(numbers)
+    known = _solution(problem, data, points)
+    like = known.theta[0]
 
     def momentum(varied, points):
-        now = [to_nodes(value, theta[0]) for value in data]
+        now = [to_nodes(value, like) for value in data]
         for i, value in zip(problem.varied, varied, strict=True):
-            now[i] = to_nodes(value, theta[0])
-        theta_, rate_ = path_nodes(points, problem.steps)
-        of_all = angular_momentum(problem.robot(now), [sincos(a) for a in theta_], rate_, omega, velocity, base.centre)
-        return _at_nodes(of_all, theta[0])
+            now[i] = to_nodes(value, like)
+        theta, rate = path_nodes(points, problem.steps)
+        fixed = (known.omega, known.velocity, known.base.centre)
+        return _at_nodes(angular_momentum(problem.robot(now), [sincos(a) for a in theta], rate, *fixed), like)
 
     given = iter(changes)
     by_data = _apart(next(given)) if problem.varied else []
     by_points = next(given) if problem.moved else jnp.zeros_like(points)
     _, change = jax.jvp(momentum, ([data[i] for i in problem.varied], points), (by_data, by_points))
-    change_of_omega = _at_nodes(solve(base.inertia, scale(-1, change)), theta[0])
-    in_step = mean_over_step(step.inside(keep(change_of_omega)))
-    in_step = keep(in_step)
-    x, y, z = (c.sum() for c in rotate(times(before, step.half), in_step))
+    change_of_omega = keep(_at_nodes(solve(known.base.inertia, scale(-1, change)), like))
+    in_step = keep(mean_over_step(known.step.inside(change_of_omega)))
+    x, y, z = (c.sum() for c in rotate(known.to_step, in_step))
     return [jnp.stack([x, y, z])]
 
 
 def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.Array) -> list[jax.Array]:
-    """Transpose of `_push`."""
-    shapes = [jax.ShapeDtypeStruct((len(problem.varied),), points.dtype)] * bool(problem.varied)
-    shapes += [jax.ShapeDtypeStruct(points.shape, points.dtype)] * problem.moved
-    push = jax.linear_transpose(lambda *changes: _push(problem, numbers, points, *changes)[0], *shapes)
-    return list(push(by_turn))
+    """Transpose of `_push`: what the scalar product of `by_turn` with the end's turn changes by."""
+    data = _apart(numbers)
+    robot = problem.robot(data)
+    known = _solution(problem, data, points)
+    like = known.theta[0]
+    in_step = keep(rotate(inverse(known.to_step), _apart(by_turn)))
+    by_omega = known.step.back(in_step)
+    mu = keep(_at_nodes(solve(known.base.inertia, scale(-1, by_omega)), like))
+    of = slopes(robot, known.sine_cosine, known.rate, known.omega, known.velocity, known.base.centre, mu)
+    found = []
+    if problem.varied:
+        by_entry, loops = (
+            [leaf for leaf, known in zip(jax.tree.leaves(tree), problem.known, strict=True) if known is None]
+            for tree in (of.robot, together(robot))
+        )
+        sums: dict[int, jax.Array] = {}
+        for loop in dict.fromkeys(loops[i] for i in problem.varied):
+            places = [i for i in problem.varied if loops[i] == loop]
+            values = _at_nodes([by_entry[i] for i in places], like)
+            values = keep(values) if len(values) > 1 else values
+            sums |= zip(places, map(sum_over_nodes, values), strict=True)
+        found.append(jnp.stack([sums[i] for i in problem.varied]))
+    if problem.moved:
+        by_nodes = [keep(_at_nodes(of_joint, like)) for of_joint in zip(of.theta, of.rate, strict=True)]
+        nodes = jax.linear_transpose(lambda points: path_nodes(points, problem.steps), points)
+        found += nodes(tuple(map(list, zip(*by_nodes, strict=True))))
+    return found
 
 
 def _together(numbers: list[jax.Array], like: jax.Array) -> jax.Array:

@@ -55,3 +55,9 @@ def _to_nodes_jvp(primals, tangents):
     ones = jnp.ones((1, like.shape[0]), like.dtype)
     change = jax.lax.dot(tangents[0].reshape(1, 1), ones, precision=jax.lax.Precision.HIGHEST)
     return to_nodes(value, like), change.reshape(-1)
+
+
+def sum_over_nodes(values: jax.Array) -> jax.Array:
+    """Sum of an array of nodes, a number."""
+    ones = jnp.ones((values.shape[0], 1), values.dtype)
+    return jax.lax.dot(values.reshape(1, -1), ones, precision=jax.lax.Precision.HIGHEST).reshape(())

@@ -1,9 +1,9 @@
 """Quaternions (w, x, y, z) of arrays, and ordered products of many along the first axis."""
 
-import math
-
 import jax
 import jax.numpy as jnp
+
+from reojax._fast.store import keep
 
 Quaternion = tuple[jax.Array, ...]
 """w, x, y, z."""
@@ -32,6 +32,12 @@ def rotate(q: Quaternion, v: Triple) -> Triple:
     )
 
 
+def inverse(q: Quaternion) -> Quaternion:
+    """Return the quaternion of the inverse rotation."""
+    w, x, y, z = q
+    return w, -x, -y, -z
+
+
 def to_matrix(q: Quaternion) -> jax.Array:
     """Return the 3x3 matrix of one unit quaternion, four scalars."""
     w, x, y, z = q
@@ -43,33 +49,27 @@ def to_matrix(q: Quaternion) -> jax.Array:
     return jnp.stack([jnp.stack(column) for column in columns], axis=1)
 
 
-def identity(like: jax.Array) -> Quaternion:
-    """Return identity quaternions in the shape and dtype of `like`."""
-    return jnp.ones_like(like), jnp.zeros_like(like), jnp.zeros_like(like), jnp.zeros_like(like)
+def product(factors: Quaternion) -> Quaternion:
+    """Return `factors[0] factors[1] ... factors[m - 1]` of arrays (m,), m >= 1, as four scalars: pairs, pairs of pairs, ..."""
+    while factors[0].shape[0] > 1:
+        w, *xyz = factors
+        odd = (0, w.shape[0] % 2)
+        pairs = [c.reshape(-1, 2) for c in (jnp.pad(w, odd, constant_values=1), *(jnp.pad(c, odd) for c in xyz))]
+        factors = keep(times(*(tuple(c[:, side] for c in pairs) for side in (0, 1))))
+    return tuple(c[0] for c in factors)
 
 
-def ordered_products(factors: Quaternion) -> tuple[Quaternion, Quaternion]:
-    """Return the product of all factors and the products of those before each one.
-
-    A tree of two levels: `m` factors (arrays (m,), m >= 1) in about `sqrt(m)` runs, all runs multiplied
-    side by side, then the runs' products. `lax.scan` keeps the program small for any `m`, and keeps XLA on
-    CPU from computing a factor again for each of the four components that read it.
-
-    Returns:
-        `factors[0] ... factors[m - 1]` as four scalars, and for each i `factors[0] ... factors[i - 1]` as
-        four arrays (m,), the first of them the identity.
-    """
-    m = factors[0].shape[0]
-    length = math.isqrt(m - 1) + 1
-    runs = -(-m // length)
-    padding = identity(jnp.zeros((runs * length - m,), factors[0].dtype))
-    grid = tuple(jnp.concatenate([f, p]).reshape(runs, length).T for f, p in zip(factors, padding, strict=True))
-    run, before_in_run = _chain(grid)
-    total, before_run = _chain(run)
-    before = times(tuple(q[None, :] for q in before_run), before_in_run)
-    return total, tuple(q.T.reshape(-1)[:m] for q in before)
+def products_up_to(factors: Quaternion) -> Quaternion:
+    """Return for each i the product `factors[0] ... factors[i]`, four arrays (m,): of runs of 2, 4, 8, ... up to each."""
+    length = 1
+    while length < factors[0].shape[0]:
+        factors = keep(times(shifted(factors, length), factors))
+        length *= 2
+    return factors
 
 
-def _chain(factors: Quaternion) -> tuple[Quaternion, Quaternion]:
-    start = identity(factors[0][0])
-    return jax.lax.scan(lambda done, factor: (times(done, factor), done), start, factors)
+def shifted(factors: Quaternion, by: int) -> Quaternion:
+    """Return the quaternions `by` places later, identities before them, without the last ones."""
+    w, *xyz = (c[:-by] for c in factors)
+    padding = (by, 0)
+    return jnp.pad(w, padding, constant_values=1), *(jnp.pad(c, padding) for c in xyz)

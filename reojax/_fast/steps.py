@@ -32,6 +32,8 @@ from reojax._fast.store import keep
 
 _MOMENTS = WEIGHTS[:, None] * LEGENDRE[:, :6]
 """values (steps, 8) @ _MOMENTS = integrals of the values times the first six Legendre polynomials."""
+_SHARES = WEIGHTS[None, :]
+"""values (steps, 1) @ _SHARES = their part at each node of a mean over the step."""
 _MEAN_AT_NODES = np.repeat(WEIGHTS[:, None], len(NODES), axis=1)
 
 
@@ -86,6 +88,8 @@ class Step(NamedTuple):
     """`exp(wbar / 2)`, four arrays (steps,)."""
     inside: Callable[[Triple], Triple]
     """Turns vectors at the nodes by `P(s) exp(U(s)) exp((s - 1/2) wbar)`, keeping what is in between."""
+    back: Callable[[Triple], Triple]
+    """Transpose of the mean over each step of `inside`: vectors (steps,) to vectors at the nodes."""
 
 
 def step_rotations(omega: Triple) -> Step:
@@ -105,12 +109,21 @@ def step_rotations(omega: Triple) -> Step:
     inner = keep(times(_exp_small(first), _exp_small(_moments(u, 1)[0])))
     rotation = keep(times(times(half, inner), half))
 
+    def turns() -> tuple[Triple, ...]:
+        return _combine((s, mean)), turned, _at_nodes(v, _INTEGRAL)
+
     def inside(vectors: Triple) -> Triple:
-        for turn in (_combine((s, mean)), turned, _at_nodes(v, _INTEGRAL)):
+        for turn in turns():
             vectors = keep(_rotate(turn, vectors))
         return vectors
 
-    return Step(rotation, half, inside)
+    def back(vectors: Triple) -> Triple:
+        vectors = keep(_at_nodes(vectors, _SHARES))
+        for turn in reversed(turns()):
+            vectors = keep(_rotate(_combine((-1.0, turn)), vectors))
+        return vectors
+
+    return Step(rotation, half, inside, back)
 
 
 def mean_over_step(values: Triple) -> Triple:

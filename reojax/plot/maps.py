@@ -8,6 +8,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
+from reojax._arrays import Array
 from reojax.plot._style import GREY, INK, PALE
 from reojax.plot._view import View
 from reojax.plot.robots import draw_robot_flat, posed_faces
@@ -124,7 +125,7 @@ def draw_lines(
 def draw_poses(
     axes: Axes,
     robots: Robot | Sequence[Robot],
-    rotations: Float[ArrayLike, "r c 3 3"],
+    rotations: Float[Array, "r c 3 3"],
     *,
     columns: Sequence[str],
     rows: Sequence[str],
