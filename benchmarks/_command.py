@@ -15,6 +15,8 @@ from typing import Any
 import jax
 from systems._measure import CORES
 
+from reojax._session import hold_memory
+
 PACKAGES = (
     *("jax", "jaxlib", "numpy", "scipy", "pin", "mujoco", "mujoco-mjx", "casadi"),
     *("adam-robotics", "diffrax", "equinox"),
@@ -50,7 +52,8 @@ def run(main: Callable[..., None], parser: argparse.ArgumentParser) -> None:
 
 
 def settings() -> None:
-    """Switch float64 on, and the compilation cache off."""
+    """Switch float64 on and the compilation cache off, and hold freed memory."""
+    hold_memory()
     jax.config.update("jax_enable_x64", True)
     jax.config.update("jax_enable_compilation_cache", False)
 

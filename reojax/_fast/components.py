@@ -36,6 +36,11 @@ class Components(NamedTuple):
     """Rotor momentum per joint rate, along the joint axis, signed by the link that carries it."""
     parent: tuple[int, ...]
 
+    @property
+    def axes_known(self) -> bool:
+        """Whether all axes are known to be the frame's own."""
+        return all(isinstance(c, int) for axis in self.axis for c in axis)
+
 
 def pattern_of(robot: Robot) -> Pattern:
     """Where each array of `robot` holds 0, 1 or -1, as far as it can be known now; hashable."""

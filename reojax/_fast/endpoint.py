@@ -23,9 +23,19 @@ from reojax._fast.blocks import Call, in_blocks
 from reojax._fast.components import Components
 from reojax._fast.momentum import angular_momentum
 from reojax._fast.nodes import NODES, path_nodes, sum_over_nodes, to_nodes
-from reojax._fast.omega import Base, inward, solve
-from reojax._fast.product import Quaternion, Triple, inverse, product, products_up_to, rotate, shifted, times, to_matrix
-from reojax._fast.scalar import cross, plus, times as scale
+from reojax._fast.omega import apply_symmetric, inverse, inward, solve
+from reojax._fast.product import (
+    Quaternion,
+    Triple,
+    conjugate,
+    product,
+    products_up_to,
+    rotate,
+    shifted,
+    times,
+    to_matrix,
+)
+from reojax._fast.scalar import Symmetric, Vector, cross, plus, times as scale
 from reojax._fast.sincos import sincos
 from reojax._fast.steps import Step, mean_over_step, step_rotations
 from reojax._fast.store import keep
@@ -101,7 +111,9 @@ class Solution(NamedTuple):
     theta: list[jax.Array]
     rate: list[jax.Array]
     sine_cosine: list[Any]
-    base: Base
+    inverse: Symmetric
+    """Of `A`."""
+    centre: Vector
     omega: Triple
     velocity: Any
     """Of the base's origin, the centre of mass being at rest."""
@@ -113,14 +125,16 @@ class Solution(NamedTuple):
 def _solution(problem: Problem, data: list[jax.Array], points: jax.Array) -> Solution:
     theta, rate = path_nodes(points, problem.steps)
     sine_cosine = [keep(sincos(angle)) for angle in theta]
-    base = inward(problem.robot(data), sine_cosine, rate)
+    robot = problem.robot(data)
+    base = inward(robot, sine_cosine, rate, by_joint=not robot.axes_known)
     moving = keep((*base.momentum, *base.drift))
-    base = Base(keep(base.inertia), moving[:3], keep(base.centre), moving[3:])
-    omega = keep(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0]))
-    velocity = scale(-1, plus(base.drift, cross(omega, base.centre)))
+    centre, drift = keep(base.centre), moving[3:]
+    inverse_of_inertia = keep(inverse(keep(base.inertia)))
+    omega = keep(_at_nodes(apply_symmetric(inverse_of_inertia, scale(-1, moving[:3])), theta[0]))
+    velocity = scale(-1, plus(drift, cross(omega, centre)))
     step = step_rotations(omega)
     to_step = keep(times(shifted(products_up_to(step.rotation), 1), step.half))
-    return Solution(theta, rate, sine_cosine, base, omega, velocity, step, to_step)
+    return Solution(theta, rate, sine_cosine, inverse_of_inertia, centre, omega, velocity, step, to_step)
 
 
 def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax.Array) -> list[jax.Array]:
@@ -134,14 +148,14 @@ def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax
         for i, value in zip(problem.varied, varied, strict=True):
             now[i] = to_nodes(value, like)
         theta, rate = path_nodes(points, problem.steps)
-        fixed = (known.omega, known.velocity, known.base.centre)
+        fixed = (known.omega, known.velocity, known.centre)
         return _at_nodes(angular_momentum(problem.robot(now), [sincos(a) for a in theta], rate, *fixed), like)
 
     given = iter(changes)
     by_data = _apart(next(given)) if problem.varied else []
     by_points = next(given) if problem.moved else jnp.zeros_like(points)
     _, change = jax.jvp(momentum, ([data[i] for i in problem.varied], points), (by_data, by_points))
-    change_of_omega = keep(_at_nodes(solve(known.base.inertia, scale(-1, change)), like))
+    change_of_omega = keep(_at_nodes(apply_symmetric(known.inverse, scale(-1, change)), like))
     in_step = keep(mean_over_step(known.step.inside(change_of_omega)))
     x, y, z = (c.sum() for c in rotate(known.to_step, in_step))
     return [jnp.stack([x, y, z])]
@@ -153,10 +167,10 @@ def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.
     robot = problem.robot(data)
     known = _solution(problem, data, points)
     like = known.theta[0]
-    in_step = keep(rotate(inverse(known.to_step), _apart(by_turn)))
+    in_step = keep(rotate(conjugate(known.to_step), _apart(by_turn)))
     by_omega = known.step.back(in_step)
-    mu = keep(_at_nodes(solve(known.base.inertia, scale(-1, by_omega)), like))
-    of = slopes(robot, known.sine_cosine, known.rate, known.omega, known.velocity, known.base.centre, mu)
+    mu = keep(_at_nodes(apply_symmetric(known.inverse, scale(-1, by_omega)), like))
+    of = slopes(robot, known.sine_cosine, known.rate, known.omega, known.velocity, known.centre, mu)
     found = []
     if problem.varied:
         by_entry, loops = (
@@ -167,8 +181,7 @@ def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.
         for loop in dict.fromkeys(loops[i] for i in problem.varied):
             places = [i for i in problem.varied if loops[i] == loop]
             values = _at_nodes([by_entry[i] for i in places], like)
-            values = keep(values) if len(values) > 1 else values
-            sums |= zip(places, map(sum_over_nodes, values), strict=True)
+            sums |= zip(places, sum_over_nodes(values), strict=True)
         found.append(jnp.stack([sums[i] for i in problem.varied]))
     if problem.moved:
         by_nodes = [keep(_at_nodes(of_joint, like)) for of_joint in zip(of.theta, of.rate, strict=True)]

@@ -5,6 +5,8 @@ the nodes in one vectorised loop. What is known per step comes to its nodes by a
 and sums over nodes are such products too; the loops of plain broadcasts and reductions are short and slow.
 """
 
+from collections.abc import Sequence
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -57,7 +59,7 @@ def _to_nodes_jvp(primals, tangents):
     return to_nodes(value, like), change.reshape(-1)
 
 
-def sum_over_nodes(values: jax.Array) -> jax.Array:
-    """Sum of an array of nodes, a number."""
-    ones = jnp.ones((values.shape[0], 1), values.dtype)
-    return jax.lax.dot(values.reshape(1, -1), ones, precision=jax.lax.Precision.HIGHEST).reshape(())
+def sum_over_nodes(values: Sequence[jax.Array]) -> Sequence[jax.Array]:
+    """Sum each of several arrays of nodes, in one loop."""
+    zeros = [jnp.zeros((), x.dtype) for x in values]
+    return jax.lax.reduce(list(values), zeros, lambda a, b: [x + y for x, y in zip(a, b, strict=True)], (0,))

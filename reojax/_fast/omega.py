@@ -37,8 +37,8 @@ from reojax._fast.scalar import (
 from reojax._fast.sincos import sincos
 from reojax._fast.store import keep
 
-_KEPT = 4
-"""Joints from one kept link to the next."""
+_AT_ONCE = 4
+"""So many joints are computed in one loop; from more on, it reads too many values to be vectorised."""
 
 
 class Base(NamedTuple):
@@ -60,11 +60,15 @@ def omega(robot: Components, theta: Sequence[jax.Array], rate: Sequence[jax.Arra
     return solve(base.inertia, times(-1, base.momentum))
 
 
-def inward(robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate: Sequence[Scalar]) -> Base:
-    """Gather inertia and momentum from the tips to the base; `keep` (`store`) what every fourth joint hands on.
+def inward(
+    robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate: Sequence[Scalar], *, by_joint: bool = False
+) -> Base:
+    """Gather inertia and momentum from the tips to the base.
 
-    Without, XLA computes long chains again for every value they end in: compile time grows with their square or worse.
+    What a joint hands on is kept (`store`) in long robots, or if `by_joint`: without, XLA computes long chains again for
+    every value they end in, and compile time grows with their square or worse.
     """
+    by_joint = by_joint or len(robot.parent) > _AT_ONCE
     m = list(robot.mass)
     f, J = list(robot.moment), list(robot.inertia)
     p, h = [ZERO] * len(m), [ZERO] * len(m)
@@ -80,7 +84,7 @@ def inward(robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate
         J[parent] = plus(J[parent], plus(conjugate(E, J[link]), _shift(m[link], moment, a)))
         f[parent] = plus(f[parent], plus(moment, times(m[link], a)))
         m[parent] = add(m[parent], m[link])
-        if k and k % _KEPT == 0:
+        if k and by_joint:
             moving = keep((*p[parent], *h[parent]))
             p[parent], h[parent], J[parent], f[parent] = moving[:3], moving[3:], keep(J[parent]), keep(f[parent])
     centre, drift = times(1 / m[0], f[0]), times(1 / m[0], p[0])
@@ -123,8 +127,20 @@ def _shift(mass: Scalar, moment: Vector, a: Vector) -> Symmetric:
     return (*times(2, (add(y, z), add(x, z), add(x, y))), *times(-1, products))
 
 
+def inverse(A: Symmetric) -> Symmetric:
+    """Return the inverse of a symmetric positive definite matrix."""
+    adjugate, determinant = _adjugate(A)
+    return times(1 / determinant, adjugate)
+
+
 def solve(A: Symmetric, right: Vector) -> Vector:
-    """Solve `A x = right`, `A` symmetric positive definite, by its adjugate."""
+    """Solve `A x = right`, `A` symmetric positive definite."""
+    adjugate, determinant = _adjugate(A)
+    x, y, z = apply_symmetric(adjugate, right)
+    return x / determinant, y / determinant, z / determinant
+
+
+def _adjugate(A: Symmetric) -> tuple[Symmetric, Scalar]:
     xx, yy, zz, xy, xz, yz = A
     adjugate = (
         sub(mul(yy, zz), mul(yz, yz)),
@@ -134,6 +150,4 @@ def solve(A: Symmetric, right: Vector) -> Vector:
         sub(mul(xy, yz), mul(xz, yy)),
         sub(mul(xy, xz), mul(xx, yz)),
     )
-    determinant = dot((xx, xy, xz), (adjugate[0], adjugate[3], adjugate[4]))
-    x, y, z = apply_symmetric(adjugate, right)
-    return x / determinant, y / determinant, z / determinant
+    return adjugate, dot((xx, xy, xz), (adjugate[0], adjugate[3], adjugate[4]))

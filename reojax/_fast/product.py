@@ -32,7 +32,7 @@ def rotate(q: Quaternion, v: Triple) -> Triple:
     )
 
 
-def inverse(q: Quaternion) -> Quaternion:
+def conjugate(q: Quaternion) -> Quaternion:
     """Return the quaternion of the inverse rotation."""
     w, x, y, z = q
     return w, -x, -y, -z

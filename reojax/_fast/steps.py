@@ -120,8 +120,8 @@ def step_rotations(omega: Triple) -> Step:
     def back(vectors: Triple) -> Triple:
         vectors = keep(_at_nodes(vectors, _SHARES))
         for turn in reversed(turns()):
-            vectors = keep(_rotate(_combine((-1.0, turn)), vectors))
-        return vectors
+            vectors = _rotate(_combine((-1.0, turn)), vectors)
+        return keep(vectors)
 
     return Step(rotation, half, inside, back)
 

@@ -78,9 +78,7 @@ def slopes(
     turning, pull = [()] * len(joints), [()] * len(joints)
     for k in reversed(joints):
         link, parent, e = k + 1, robot.parent[k], robot.axis[k]
-        if link in robot.parent:  # the momentum of a tip is computed where it is read
-            momentum[link], likewise[link] = _kept(momentum[link]), _kept(likewise[link])
-        (p, h), (p_, h_) = momentum[link], likewise[link]
+        (p, h), (p_, h_) = momentum[link], likewise[link] = _kept(momentum[link]), _kept(likewise[link])
         (w, v), (w_, v_) = actual[link], virtual[link]
         u = plus(w, times(mul(-1, rate[k]), e))
         turning[k] = plus(plus(cross(h_, u), cross(p_, v)), plus(cross(h, w_), cross(p, v_)))
