@@ -22,7 +22,7 @@ from jax.custom_derivatives import SymbolicZero
 from reojax._fast.blocks import Call, in_blocks
 from reojax._fast.components import Components
 from reojax._fast.momentum import angular_momentum
-from reojax._fast.nodes import NODES, path_nodes, sum_over_nodes, to_nodes
+from reojax._fast.nodes import NODES, path_nodes, sum_over_nodes, to_nodes, to_points
 from reojax._fast.omega import apply_symmetric, inverse, inward, solve
 from reojax._fast.product import (
     Quaternion,
@@ -185,8 +185,7 @@ def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.
         found.append(jnp.stack([sums[i] for i in problem.varied]))
     if problem.moved:
         by_nodes = [keep(_at_nodes(of_joint, like)) for of_joint in zip(of.theta, of.rate, strict=True)]
-        nodes = jax.linear_transpose(lambda points: path_nodes(points, problem.steps), points)
-        found += nodes(tuple(map(list, zip(*by_nodes, strict=True))))
+        found.append(to_points(*map(list, zip(*by_nodes, strict=True)), points, problem.steps))
     return found
 
 

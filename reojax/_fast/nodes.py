@@ -1,8 +1,8 @@
 """Joint angles and rates at the quadrature nodes of a polygon, and sums over nodes.
 
 Values at the nodes are one-dimensional arrays, step by step: `vmap` makes them (designs, nodes), and XLA runs along
-the nodes in one vectorised loop. What is known per step comes to its nodes by a product with a constant matrix,
-and sums over nodes are such products too; the loops of plain broadcasts and reductions are short and slow.
+the nodes in one vectorised loop. Means and integrals over a step are products with a constant matrix, for the loops of
+plain reductions are short and slow.
 """
 
 from collections.abc import Sequence
@@ -10,6 +10,8 @@ from collections.abc import Sequence
 import jax
 import jax.numpy as jnp
 import numpy as np
+
+from reojax._fast.store import keep
 
 _x, _w = np.polynomial.legendre.leggauss(8)
 
@@ -27,22 +29,36 @@ def per_step(values: jax.Array, matrix: np.ndarray) -> jax.Array:
     return jax.lax.dot(values.reshape(-1, matrix.shape[0]), constant, precision=jax.lax.Precision.HIGHEST)
 
 
-_LINE = np.stack([np.ones_like(NODES), NODES])
-_LEVEL = np.stack([np.zeros_like(NODES), np.ones_like(NODES)])
-
-
 def path_nodes(points: jax.Array, steps: int) -> tuple[list[jax.Array], list[jax.Array]]:
     """Joint angles and their rates per step at all nodes of the polygon `points` (v, j), joint by joint."""
-    rate = (points[1:] - points[:-1]) / steps
-    index = jnp.arange(steps, dtype=points.dtype)[None, :, None]
-    start = points[:-1, None, :] + rate[:, None, :] * index
-    lines = jnp.stack([start, jnp.broadcast_to(rate[:, None, :], start.shape)])  # (2, edges, steps, j)
+    start, rate = _lines(points, steps)
     theta, theta_dot = [], []
     for k in range(points.shape[1]):
-        line = lines[..., k].reshape(2, -1).T
-        theta.append(per_step(line, _LINE).reshape(-1))
-        theta_dot.append(per_step(line, _LEVEL).reshape(-1))
+        a, b = start[..., k].reshape(-1, 1), rate[..., k].reshape(-1, 1)
+        along = a + b * jnp.asarray(NODES, points.dtype)
+        both = keep((along.reshape(-1), jnp.broadcast_to(b, along.shape).reshape(-1)))
+        theta.append(both[0])
+        theta_dot.append(both[1])
     return theta, theta_dot
+
+
+def to_points(theta: list[jax.Array], rate: list[jax.Array], points: jax.Array, steps: int) -> jax.Array:
+    """Transpose of `path_nodes`: from cotangents of all angles and rates to that of the points (v, j)."""
+    ones = np.ones((len(NODES), 1))
+    by_start = [per_step(x, ones) for x in theta]
+    by_rate = [per_step(x, NODES[:, None]) + per_step(y, ones) for x, y in zip(theta, rate, strict=True)]
+    shape = (points.shape[0] - 1, steps, points.shape[1])
+    lines = [jnp.concatenate(columns, axis=1).reshape(shape) for columns in (by_start, by_rate)]
+    (found,) = jax.linear_transpose(lambda points: _lines(points, steps), points)(tuple(lines))
+    return found
+
+
+def _lines(points: jax.Array, steps: int) -> tuple[jax.Array, jax.Array]:
+    """Angles at the start of each step and their rate per step, (edges, steps, j) both."""
+    rate = (points[1:] - points[:-1])[:, None, :] / steps
+    index = jnp.arange(steps, dtype=points.dtype)[None, :, None]
+    start = points[:-1, None, :] + rate * index
+    return start, jnp.broadcast_to(rate, start.shape)
 
 
 @jax.custom_jvp
@@ -61,5 +77,8 @@ def _to_nodes_jvp(primals, tangents):
 
 def sum_over_nodes(values: Sequence[jax.Array]) -> Sequence[jax.Array]:
     """Sum each of several arrays of nodes, in one loop."""
+    if len(values) == 1:
+        ones = jnp.ones((values[0].shape[0], 1), values[0].dtype)
+        return [jax.lax.dot(values[0][None, :], ones, precision=jax.lax.Precision.HIGHEST).reshape(())]
     zeros = [jnp.zeros((), x.dtype) for x in values]
     return jax.lax.reduce(list(values), zeros, lambda a, b: [x + y for x, y in zip(a, b, strict=True)], (0,))
