@@ -30,8 +30,10 @@ from reojax._fast.product import Quaternion, Triple, times
 from reojax._fast.sincos import horner, sincos
 from reojax._fast.store import keep
 
-_MOMENTS = WEIGHTS[:, None] * LEGENDRE[:, :6]
-"""values (steps, 8) @ _MOMENTS = integrals of the values times the first six Legendre polynomials."""
+_MOMENTS = WEIGHTS[:, None] * LEGENDRE
+"""values (steps, 8) @ _MOMENTS = integrals of the values times the Legendre polynomials."""
+_USED = 6
+"""Moments that the Magnus series uses; a product with all eight is faster than with six."""
 _SHARES = WEIGHTS[None, :]
 """values (steps, 1) @ _SHARES = their part at each node of a mean over the step."""
 _MEAN_AT_NODES = np.repeat(WEIGHTS[:, None], len(NODES), axis=1)
@@ -71,7 +73,7 @@ def _at_nodes(values: Triple, matrix: np.ndarray) -> Triple:
 
 def _moments(values: Triple, count: int) -> list[Triple]:
     """Integrals over each step of three arrays of nodes, times the first Legendre polynomials."""
-    x, y, z = (per_step(v, _MOMENTS[:, :count]) for v in values)
+    x, y, z = (per_step(v, _MOMENTS[:, :1] if count == 1 else _MOMENTS) for v in values)
     return [(x[:, n], y[:, n], z[:, n]) for n in range(count)]
 
 
@@ -103,7 +105,7 @@ def step_rotations(omega: Triple) -> Step:
     u = keep(_rotate(_combine((s, mean)), _combine((1.0, omega), (-1.0, mean))))
     turned = _at_nodes(u, _INTEGRAL)
     v = keep(_fer(u, turned))
-    m = _moments(v, _MOMENTS.shape[1])
+    m = _moments(v, _USED)
     first = _combine((1.0, m[0]), *((0.5, _cross(a, b)) for a, b in pairwise(m)))
     half = keep(_exp(_combine((0.5, _moments(omega, 1)[0]))))
     inner = keep(times(_exp_small(first), _exp_small(_moments(u, 1)[0])))
