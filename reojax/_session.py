@@ -37,8 +37,8 @@ def start() -> None:
 def hold_memory() -> None:
     """Keep freed memory for the next call instead of giving it back to the system (glibc).
 
-    XLA asks for its buffers anew at every call; where their pages are fresh each time, some programs take three times as
-    long. As the environment does with `MALLOC_TRIM_THRESHOLD_=268435456 MALLOC_MMAP_THRESHOLD_=33554432`, which go first.
+    XLA asks for its buffers anew at every call; where their pages are fresh each time, some programs take three times
+    as long. What the environment says (`MALLOC_TRIM_THRESHOLD_`, `MALLOC_MMAP_THRESHOLD_`) goes first.
     """
     if sys.platform == "linux" and not any(name.startswith("MALLOC_") for name in os.environ):
         mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # musl has none

@@ -152,3 +152,16 @@ def test_by_the_amplitudes(weight, amplitudes):
     np.testing.assert_allclose(forward, np.transpose(reverse), atol=1e-12)
     np.testing.assert_allclose(forward, difference, atol=1e-9)
     assert (np.abs(forward).max() > 1e-2) == any(amplitudes)
+
+
+def test_reverse_is_the_transpose_of_forward_in_a_long_robot():
+    """By every number at once, where what the links hand on is kept one by one."""
+    robot = random_robot(4, 5, branched=True, limits=LIMITS)
+    waypoints = np.random.default_rng(1).uniform(-2, 2, (4, 5))
+    numbers, build = ravel_pytree((robot, waypoints))
+    change = np.random.default_rng(2).normal(size=len(numbers)) * np.maximum(np.abs(numbers), 0.1)
+    weight = np.random.default_rng(3).normal(size=4)
+    _, moved = push(robot, waypoints, *build(change))
+    slopes, _ = ravel_pytree(pull(robot, waypoints, weight))
+    assert np.abs(moved).max() > 0.1
+    np.testing.assert_allclose(slopes @ change, weight @ moved, rtol=1e-10)

@@ -5,11 +5,11 @@ the end by `R(s) d omega(s)` seen from the start, so `dR R^T = hat(integral of R
 `L(theta, theta_dot, omega) = 0` along the path, `d omega = -A^-1 dL` with `dL` the change of the angular momentum
 at a fixed motion of the base: nothing of the inverse has to be differentiated. The linear momentum of that fixed
 motion being zero, its reference point and velocity may stay fixed too (their first-order effects cancel).
-The sum uses the nodes and values of the solution itself.
-Reverse mode is the transpose of this, which JAX finds: one constant vector turned into each node's frame, `A^-1`,
-and one pass through the momentum. It computes the values at the nodes again, block by block (`blocks`): keeping
-them from the first pass would take as long, and memory for all designs. What it is by are the masses, moments and so
-on of `components`; from there to the arrays of a robot JAX differentiates as usual.
+The sum uses the nodes and values of the solution itself. Forward mode (`_push`) takes `dL` from `momentum`.
+Reverse mode (`_pull`) is the transpose: one constant vector `l` turned into each node's frame, `mu = -A^-1 R^T l`, and
+the derivative of `mu . L` in closed form (`virtual`). Both compute the values at the nodes again, block by block
+(`blocks`): keeping them from the first pass would take as long, and memory for all designs. What they are by are the
+masses, moments and so on of `components`; from there to the arrays of a robot JAX differentiates as usual.
 """
 
 from functools import partial
@@ -167,7 +167,7 @@ def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.
     robot = problem.robot(data)
     known = _solution(problem, data, points)
     like = known.theta[0]
-    in_step = keep(rotate(conjugate(known.to_step), _apart(by_turn)))
+    in_step = keep(rotate(conjugate(known.to_step), tuple(_apart(by_turn))))
     by_omega = known.step.back(in_step)
     mu = keep(_at_nodes(apply_symmetric(known.inverse, scale(-1, by_omega)), like))
     of = slopes(robot, known.sine_cosine, known.rate, known.omega, known.velocity, known.centre, mu)
@@ -185,7 +185,8 @@ def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.
         found.append(jnp.stack([sums[i] for i in problem.varied]))
     if problem.moved:
         by_nodes = [keep(_at_nodes(of_joint, like)) for of_joint in zip(of.theta, of.rate, strict=True)]
-        found.append(to_points(*map(list, zip(*by_nodes, strict=True)), points, problem.steps))
+        by_theta, by_rate = ([pair[i] for pair in by_nodes] for i in (0, 1))
+        found.append(to_points(by_theta, by_rate, points, problem.steps))
     return found
 
 

@@ -1,7 +1,6 @@
-"""The robot's angular momentum with everything moving, for its derivative at fixed motion of the base.
+"""The robot's angular momentum with everything moving, for its derivative at fixed motion of the base (forward mode).
 
-Written outward and back inward, so that reverse differentiation of it is the efficient adjoint: the
-transposed inward pass carries one rigid virtual motion outward to all links.
+`virtual` has the same derivative for reverse mode.
 """
 
 from collections.abc import Sequence
@@ -24,8 +23,7 @@ def angular_momentum(
 
     Outward, each link's angular velocity `w` and its origin's velocity `v`, in its own frame:
     `w' = E^T w + rate e`, `v' = E^T (v + w x a)`. There, momentum `p = m v + w x f`, `h = J w + f x v`. Inward,
-    `p + E p'`, `h + E h' + a x E p'`, and the rotors. Values are kept link by link (`store`), and so is what
-    reverse differentiation carries outward.
+    `p + E p'`, `h + E h' + a x E p'`, and the rotors. Values are kept link by link (`store`).
     """
     joints = range(len(robot.parent))
     E = [joint_rotation(e, *sc) for e, sc in zip(robot.axis, sine_cosine, strict=True)]

@@ -35,7 +35,7 @@ def path_nodes(points: jax.Array, steps: int) -> tuple[list[jax.Array], list[jax
     theta, theta_dot = [], []
     for k in range(points.shape[1]):
         a, b = start[..., k].reshape(-1, 1), rate[..., k].reshape(-1, 1)
-        along = a + b * jnp.asarray(NODES, points.dtype)
+        along = a + b * jnp.asarray(NODES[None, :], points.dtype)
         both = keep((along.reshape(-1), jnp.broadcast_to(b, along.shape).reshape(-1)))
         theta.append(both[0])
         theta_dot.append(both[1])

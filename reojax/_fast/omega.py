@@ -8,7 +8,7 @@ rates give while the base rests. Turning a joint by `E` and moving by its anchor
     f' = E f + m a                 J' = E J E^T + 2 (a . g) - (a g^T + g a^T),   g = E f + m a / 2
 
 At the base, about the centre of mass, `A = J - m (|c|^2 - c c^T)` with `c = f / m`, `L = h - c x p`, and
-`A omega + L = 0`. The derivative of all this is in `derivative`.
+`A omega + L = 0`.
 """
 
 from collections.abc import Sequence
@@ -65,8 +65,8 @@ def inward(
 ) -> Base:
     """Gather inertia and momentum from the tips to the base.
 
-    What a joint hands on is kept (`store`) in long robots, or if `by_joint`: without, XLA computes long chains again for
-    every value they end in, and compile time grows with their square or worse.
+    What a joint hands on is kept (`store`) in long robots, or if `by_joint`: without, XLA computes long chains again
+    for every value they end in, and compile time grows with their square or worse.
     """
     by_joint = by_joint or len(robot.parent) > _AT_ONCE
     m = list(robot.mass)

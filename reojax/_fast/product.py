@@ -50,7 +50,10 @@ def to_matrix(q: Quaternion) -> jax.Array:
 
 
 def product(factors: Quaternion) -> Quaternion:
-    """Return `factors[0] factors[1] ... factors[m - 1]` of arrays (m,), m >= 1, as four scalars: pairs, pairs of pairs, ..."""
+    """Return `factors[0] factors[1] ... factors[m - 1]` of arrays (m,), m >= 1, as four scalars.
+
+    Products of pairs, of pairs of pairs, and so on.
+    """
     while factors[0].shape[0] > 1:
         w, *xyz = factors
         odd = (0, w.shape[0] % 2)
@@ -60,7 +63,10 @@ def product(factors: Quaternion) -> Quaternion:
 
 
 def products_up_to(factors: Quaternion) -> Quaternion:
-    """Return for each i the product `factors[0] ... factors[i]`, four arrays (m,): of runs of 2, 4, 8, ... up to each."""
+    """Return for each i the product `factors[0] ... factors[i]`, four arrays (m,).
+
+    Products of the last 2, 4, 8, ... factors up to each.
+    """
     length = 1
     while length < factors[0].shape[0]:
         factors = keep(times(shifted(factors, length), factors))

@@ -13,13 +13,13 @@ seen from them, change by `-d x (.)`, except that the joint's own rate turns wit
 
     d . (h~ x u + p~ x v + h x w~ + p x v~)
 
-A rate moves them by `e`, and meets `e . h~`; an anchor's shift `da` meets `E (p~ x u + p x w~)` in the parent's frame; a
-change `de` of a unit axis turns them by `d = sin(theta) de - (1 - cos(theta)) e x de`, the right Jacobian of the
+A rate moves them by `e`, and meets `e . h~`; an anchor's shift `da` meets `E (p~ x u + p x w~)` in the parent's frame;
+a change `de` of a unit axis turns them by `d = sin(theta) de - (1 - cos(theta)) e x de`, the right Jacobian of the
 exponential map at `theta e`. One pass outward for both motions and one inward for both momenta give it all.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from reojax._fast.components import Components
 from reojax._fast.omega import apply_symmetric, joint_rotation
@@ -75,7 +75,8 @@ def slopes(
     bodies = list(zip(robot.mass, robot.moment, robot.inertia, strict=True))
     momentum = [_momentum(*body, *motion) for body, motion in zip(bodies, actual, strict=True)]
     likewise = [_momentum(*body, *motion) for body, motion in zip(bodies, virtual, strict=True)]
-    turning, pull = [()] * len(joints), [()] * len(joints)
+    turning: list[Vector] = [()] * len(joints)
+    pull: list[Vector] = [()] * len(joints)
     for k in reversed(joints):
         link, parent, e = k + 1, robot.parent[k], robot.axis[k]
         (p, h), (p_, h_) = momentum[link], likewise[link] = _kept(momentum[link]), _kept(likewise[link])
@@ -116,10 +117,10 @@ def slopes(
     )
 
 
-def together(robot: Components) -> Components:
+def together(robot: Components) -> Any:
     """Name for each entry what is best computed in one loop with it, as it reads the same values."""
     links, joints = range(len(robot.mass)), range(len(robot.parent))
-    return Components(
+    names: dict[str, Any] = dict(
         mass=[f"body {i}" for i in links],
         moment=[(f"body {i}",) * 3 for i in links],
         inertia=[(f"inertia {i}",) * 6 for i in links],
@@ -128,6 +129,7 @@ def together(robot: Components) -> Components:
         rotor_spin=[f"axis {k}" for k in joints],
         parent=robot.parent,
     )
+    return Components(**names)
 
 
 def _kept(pair: Motion) -> Motion:
