@@ -55,7 +55,9 @@ def main(out: Path, *, quick: bool) -> None:
     task = Task(reference.loops, CHECKED, quick, 0.2 if quick else 1.0, 0, reference)
     rows: list[Measured] = []
     failed: list[str] = []
-    platforms = {device.platform: device for device in reversed(jax.devices() + jax.devices("cpu"))}
+    platforms: dict[str, jax.Device] = {}
+    for device in (*jax.devices(), *jax.devices("cpu")):
+        platforms.setdefault(device.platform, device)
     for device in platforms.values():
         for dtype in (np.float64, np.float32):
             for what, sizes in SIZES.items():
