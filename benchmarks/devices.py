@@ -39,8 +39,8 @@ class Measured(NamedTuple):
     wall: float
     """Per loop, in the median [s]."""
     compile: float
-    error: float
-    """95th percentile of the angle from the reference, which the CPU computes [rad]."""
+    error: float | None
+    """Of values: 95th percentile of the angle from the reference, which the CPU computes [rad]."""
     gradient_error: float | None
     memory: int | None
     """Bytes for intermediate values."""
@@ -64,7 +64,7 @@ def main(out: Path, *, quick: bool) -> None:
                 for size in sizes[: 2 if quick else None]:
                     label = f"{device.device_kind}, {np.dtype(dtype).name}, {what}, {size}"
                     try:
-                        rows.extend(_rows(task, device, dtype, what, size))
+                        rows.append(_measured(task, device, dtype, what, size))
                     except jax.errors.JaxRuntimeError as error:  # most likely out of memory
                         failed.append(f"{label}: {str(error).partition(chr(10))[0]}")
                         say(failed[-1])
@@ -76,32 +76,30 @@ def main(out: Path, *, quick: bool) -> None:
     say(f"wrote {result}")
 
 
-def _rows(task: Task, device: jax.Device, dtype: type, what: str, size: int) -> Iterator[Measured]:
+def _measured(task: Task, device: jax.Device, dtype: type, what: str, size: int) -> Measured:
     loops = Loops(*(field.astype(dtype) for field in random_loops(size)))
     with jax.default_device(device):
         function, arguments = _call(what, jax.device_put(loops, device))
         call, seconds = compiled(function, *arguments)
         [samples] = measure([partial(call, *arguments)], task.seconds)
         found = call(*arguments)
-        values, slopes = (found, None) if what == VALUE else (None, found[1])
-        if values is None:
-            values = compiled(under_vmap(_rotation)[0], loops.first(CHECKED))[0](loops.first(CHECKED))
+        error = task.error(np.asarray(found[:CHECKED])) if what == VALUE else None
+        slopes = None if what == VALUE else found[1]
         if what == ALL:
-            robot, twist, bend = slopes
-            robots = jax.tree.map(lambda x: x[:CHECKED], robot)
+            by_robot, by_twist, by_bend = jax.tree.map(lambda x: x[:CHECKED], slopes)
             chain = jax.jit(jax.vmap(lambda loop, slope: jax.vjp(robot_of, loop)[1](slope)[0]))
-            by_loop = chain(loops.first(CHECKED), robots)
-            slopes = Loops(twist[:CHECKED], bend[:CHECKED], by_loop.inertia, by_loop.ratio)
-    columns = None if slopes is None else np.stack([np.asarray(s[:CHECKED], float) for s in slopes], axis=1)
+            by_design = chain(loops.first(CHECKED), by_robot)
+            slopes = (by_twist, by_bend, by_design.inertia, by_design.ratio)
+    columns = None if slopes is None else np.stack([np.asarray(x[:CHECKED], float) for x in slopes], axis=1)
     memory = call.memory_analysis()
-    yield Measured(
+    return Measured(
         device=device.device_kind,
         dtype=np.dtype(dtype).name,
         what=what,
         loops=size,
         wall=float(np.median(samples.wall)) / size,
         compile=seconds,
-        error=task.error(np.asarray(values[:CHECKED])),
+        error=error,
         gradient_error=None if columns is None else task.gradient_error(columns),
         memory=None if memory is None else memory.temp_size_in_bytes,
     )
@@ -129,8 +127,8 @@ def _table(rows: list[Measured]) -> Iterator[str]:
     for row in rows:
         cells = (
             *(row.device, row.dtype, row.what, f"{row.loops:_}".replace("_", " "), f"{row.wall * 1e9:.3g}"),
-            *(f"{1 / row.wall:.2g}", f"{row.error:.1e}"),
-            "" if row.gradient_error is None else f"{row.gradient_error:.1e}",
+            f"{1 / row.wall:.2g}",
+            *("" if x is None else f"{x:.1e}" for x in (row.error, row.gradient_error)),
             *(f"{row.compile:.1f}", "" if row.memory is None else f"{row.memory / 1e6:.3g}"),
         )
         yield f"| {' | '.join(cells)} |"

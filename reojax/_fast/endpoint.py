@@ -92,7 +92,9 @@ def _end_rotation_jvp(problem, primals, tangents):
     changes = ([jnp.stack([by_numbers[i] for i in varied])] if varied else []) + [by_points] * problem.moved
     if not changes:
         return rotation, jnp.zeros_like(rotation)
-    call = Call(_push, problem, ((3,),), _nodes(problem, points), transpose=_pull, linear=len(changes))
+    joints = points.shape[1]
+    nodes = _nodes(problem, points) * max(1, joints // 4)  # more values of each design are alive
+    call = Call(_push, problem, ((3,),), nodes, transpose=_pull, linear=len(changes))
     turn = in_blocks(call, _together(numbers, points), points, *changes)[0]
     return rotation, jnp.cross(turn[:, None], rotation, axis=0)
 

@@ -197,7 +197,8 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
         spread = stretch @ (xp.trace(moment[link]) / 2 * eye - moment[link]) @ stretch  # second moments of mass
         return point + stretch @ lever, xp.trace(spread) * eye - spread
 
-    first, last = stretched(0, axes[0], anchor[0]), stretched(3, axes[2], xp.zeros_like(com[3]))
+    with jax.default_matmul_precision("highest"):  # or a GPU takes 10 bits of float32
+        first, last = stretched(0, axes[0], anchor[0]), stretched(3, axes[2], xp.zeros_like(com[3]))
     return robot.replace(
         com=xp.stack([first[0], com[1], com[2], last[0]]),
         inertia=xp.stack([first[1], moment[1], moment[2], last[1]]),
