@@ -38,7 +38,7 @@ from reojax._fast.sincos import sincos
 from reojax._fast.store import keep
 
 _AT_ONCE = 4
-"""So many joints are computed in one loop; from more on, it reads too many values to be vectorised."""
+"""So many joints are computed in one loop; more values than they read would not be vectorised."""
 
 
 class Base(NamedTuple):
@@ -65,10 +65,12 @@ def inward(
 ) -> Base:
     """Gather inertia and momentum from the tips to the base.
 
-    What a joint hands on is kept (`store`) in long robots, or if `by_joint`: without, XLA computes long chains again
-    for every value they end in, and compile time grows with their square or worse.
+    In long robots, what every fourth joint hands on is kept (`store`), or every joint where axes are data, or if
+    `by_joint`: without, XLA computes long chains again for every value they end in, and compile time grows with their
+    square or worse.
     """
-    by_joint = by_joint or len(robot.parent) > _AT_ONCE
+    long = len(robot.parent) > _AT_ONCE
+    every = 1 if by_joint or (long and not robot.axes_known) else _AT_ONCE
     m = list(robot.mass)
     f, J = list(robot.moment), list(robot.inertia)
     p, h = [ZERO] * len(m), [ZERO] * len(m)
@@ -84,7 +86,7 @@ def inward(
         J[parent] = plus(J[parent], plus(conjugate(E, J[link]), _shift(m[link], moment, a)))
         f[parent] = plus(f[parent], plus(moment, times(m[link], a)))
         m[parent] = add(m[parent], m[link])
-        if k and by_joint:
+        if k and k % every == 0:
             moving = keep((*p[parent], *h[parent]))
             p[parent], h[parent], J[parent], f[parent] = moving[:3], moving[3:], keep(J[parent]), keep(f[parent])
     centre, drift = times(1 / m[0], f[0]), times(1 / m[0], p[0])
