@@ -7,8 +7,11 @@ from collections.abc import Sequence
 
 from reojax._fast.components import Components
 from reojax._fast.omega import apply_symmetric, joint_rotation
-from reojax._fast.scalar import Scalar, Vector, apply, cross, mul, plus, times, transpose
+from reojax._fast.scalar import Matrix, Scalar, Symmetric, Vector, apply, cross, mul, plus, times, transpose
 from reojax._fast.store import keep
+
+Pair = tuple[Vector, Vector]
+"""Angular velocity and velocity of the origin; or linear and angular momentum about the origin."""
 
 
 def angular_momentum(
@@ -27,23 +30,39 @@ def angular_momentum(
     """
     joints = range(len(robot.parent))
     E = [joint_rotation(e, *sc) for e, sc in zip(robot.axis, sine_cosine, strict=True)]
-    w, v = [omega], [velocity]
+    motion: list[Pair] = [(omega, velocity)]
     for k in joints:
-        outward, parent = transpose(E[k]), robot.parent[k]
-        spin = plus(apply(outward, w[parent]), times(rate[k], robot.axis[k]))
-        moving = keep((*spin, *apply(outward, plus(v[parent], cross(w[parent], robot.anchor[k])))))
-        w.append(moving[:3])
-        v.append(moving[3:])
-    p = [plus(times(m, v_), cross(w_, f)) for m, f, v_, w_ in zip(robot.mass, robot.moment, v, w, strict=True)]
-    h = [
-        plus(apply_symmetric(J, w_), cross(f, v_))
-        for J, f, v_, w_ in zip(robot.inertia, robot.moment, v, w, strict=True)
-    ]
+        w, v = outward(E[k], robot.anchor[k], motion[robot.parent[k]])
+        motion.append(kept((plus(w, times(rate[k], robot.axis[k])), v)))
+    bodies = zip(robot.mass, robot.moment, robot.inertia, motion, strict=True)
+    momentum = [body_momentum(m, f, J, *of_link) for m, f, J, of_link in bodies]
     for k in reversed(joints):
-        link, parent = k + 1, robot.parent[k]
-        carried = keep((*p[link], *h[link]))
-        push = apply(E[k], carried[:3])
+        parent = robot.parent[k]
         rotor = times(mul(rate[k], robot.rotor_spin[k]), robot.axis[k])
-        p[parent] = plus(p[parent], push)
-        h[parent] = plus(h[parent], plus(plus(apply(E[k], carried[3:]), rotor), cross(robot.anchor[k], push)))
-    return plus(h[0], times(-1, cross(centre, p[0])))
+        momentum[parent] = onto_parent(E[k], robot.anchor[k], momentum[parent], kept(momentum[k + 1]), rotor)
+    p, h = momentum[0]
+    return plus(h, times(-1, cross(centre, p)))
+
+
+def kept(pair: Pair) -> Pair:
+    """Keep both vectors together."""
+    six = keep((*pair[0], *pair[1]))
+    return six[:3], six[3:]
+
+
+def outward(E: Matrix, anchor: Vector, motion: Pair) -> Pair:
+    """Return the motion of a link that is at rest against its parent, in its own frame."""
+    w, v = motion
+    back = transpose(E)
+    return apply(back, w), apply(back, plus(v, cross(w, anchor)))
+
+
+def body_momentum(m: Scalar, f: Vector, J: Symmetric, w: Vector, v: Vector) -> Pair:
+    """Return the momentum of one link alone."""
+    return plus(times(m, v), cross(w, f)), plus(apply_symmetric(J, w), cross(f, v))
+
+
+def onto_parent(E: Matrix, anchor: Vector, own: Pair, beyond: Pair, rotor: Vector) -> Pair:
+    """Return a link's momentum with that of the links beyond a joint, and of the joint's rotor."""
+    push = apply(E, beyond[0])
+    return plus(own[0], push), plus(own[1], plus(plus(apply(E, beyond[1]), rotor), cross(anchor, push)))

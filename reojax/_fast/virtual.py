@@ -22,9 +22,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from reojax._fast.components import Components
-from reojax._fast.omega import apply_symmetric, joint_rotation
+from reojax._fast.momentum import Pair, body_momentum, kept, onto_parent, outward
+from reojax._fast.omega import joint_rotation
 from reojax._fast.scalar import (
-    Matrix,
     Scalar,
     Symmetric,
     Vector,
@@ -36,12 +36,8 @@ from reojax._fast.scalar import (
     plus,
     sub,
     times,
-    transpose,
 )
 from reojax._fast.store import keep
-
-Motion = tuple[Vector, Vector]
-"""Angular velocity and velocity of the origin; or linear and angular momentum about the origin."""
 
 
 class Slopes(NamedTuple):
@@ -65,21 +61,21 @@ def slopes(
     """Differentiate `mu . angular_momentum(...)` (`momentum`) at fixed `mu`, `omega`, `velocity` and `centre`."""
     joints = range(len(robot.parent))
     E = [joint_rotation(e, *sc) for e, sc in zip(robot.axis, sine_cosine, strict=True)]
-    actual: list[Motion] = [(omega, velocity)]
-    virtual: list[Motion] = [(mu, cross(centre, mu))]
+    actual: list[Pair] = [(omega, velocity)]
+    virtual: list[Pair] = [(mu, cross(centre, mu))]
     for k in joints:
         parent, anchor = robot.parent[k], robot.anchor[k]
-        w, v = _outward(E[k], anchor, actual[parent])
-        actual.append(_kept((plus(w, times(rate[k], robot.axis[k])), v)))
-        virtual.append(_kept(_outward(E[k], anchor, virtual[parent])))
+        w, v = outward(E[k], anchor, actual[parent])
+        actual.append(kept((plus(w, times(rate[k], robot.axis[k])), v)))
+        virtual.append(kept(outward(E[k], anchor, virtual[parent])))
     bodies = list(zip(robot.mass, robot.moment, robot.inertia, strict=True))
-    momentum = [_momentum(*body, *motion) for body, motion in zip(bodies, actual, strict=True)]
-    likewise = [_momentum(*body, *motion) for body, motion in zip(bodies, virtual, strict=True)]
+    momentum = [body_momentum(*body, *motion) for body, motion in zip(bodies, actual, strict=True)]
+    likewise = [body_momentum(*body, *motion) for body, motion in zip(bodies, virtual, strict=True)]
     turning: list[Vector] = [()] * len(joints)
     pull: list[Vector] = [()] * len(joints)
     for k in reversed(joints):
         link, parent, e = k + 1, robot.parent[k], robot.axis[k]
-        (p, h), (p_, h_) = momentum[link], likewise[link] = _kept(momentum[link]), _kept(likewise[link])
+        (p, h), (p_, h_) = momentum[link], likewise[link] = kept(momentum[link]), kept(likewise[link])
         (w, v), (w_, v_) = actual[link], virtual[link]
         u = plus(w, times(mul(-1, rate[k]), e))
         turning[k] = plus(plus(cross(h_, u), cross(p_, v)), plus(cross(h, w_), cross(p, v_)))
@@ -87,8 +83,8 @@ def slopes(
             turning[k] = keep(turning[k])
         pull[k] = plus(cross(p_, u), cross(p, w_))
         rotor = times(mul(rate[k], robot.rotor_spin[k]), e)
-        momentum[parent] = _inward(E[k], robot.anchor[k], momentum[parent], momentum[link], rotor)
-        likewise[parent] = _inward(E[k], robot.anchor[k], likewise[parent], likewise[link], (0, 0, 0))
+        momentum[parent] = onto_parent(E[k], robot.anchor[k], momentum[parent], momentum[link], rotor)
+        likewise[parent] = onto_parent(E[k], robot.anchor[k], likewise[parent], likewise[link], (0, 0, 0))
 
     along = [dot(e, virtual[k + 1][0]) for k, e in zip(joints, robot.axis, strict=True)]
     beyond = [likewise[k + 1][1] for k in joints]
@@ -130,26 +126,6 @@ def together(robot: Components) -> Any:
         parent=robot.parent,
     )
     return Components(**names)
-
-
-def _kept(pair: Motion) -> Motion:
-    six = keep((*pair[0], *pair[1]))
-    return six[:3], six[3:]
-
-
-def _outward(E: Matrix, anchor: Vector, motion: Motion) -> Motion:
-    w, v = motion
-    back = transpose(E)
-    return apply(back, w), apply(back, plus(v, cross(w, anchor)))
-
-
-def _inward(E: Matrix, anchor: Vector, own: Motion, beyond: Motion, rotor: Vector) -> Motion:
-    push = apply(E, beyond[0])
-    return plus(own[0], push), plus(own[1], plus(plus(apply(E, beyond[1]), rotor), cross(anchor, push)))
-
-
-def _momentum(m: Scalar, f: Vector, J: Symmetric, w: Vector, v: Vector) -> Motion:
-    return plus(times(m, v), cross(w, f)), plus(apply_symmetric(J, w), cross(f, v))
 
 
 def _products(a: Vector, b: Vector) -> Symmetric:
