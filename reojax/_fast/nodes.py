@@ -34,7 +34,7 @@ def path_nodes(points: jax.Array, steps: int) -> tuple[list[jax.Array], list[jax
     start, rate = _lines(points, steps)
     theta, theta_dot = [], []
     for k in range(points.shape[1]):
-        a, b = start[..., k].reshape(-1, 1), rate[..., k].reshape(-1, 1)
+        a, b = (x[:, None] for x in keep((start[..., k].reshape(-1), rate[..., k].reshape(-1))))
         along = a + b * jnp.asarray(NODES[None, :], points.dtype)
         both = keep((along.reshape(-1), jnp.broadcast_to(b, along.shape).reshape(-1)))
         theta.append(both[0])
