@@ -9,9 +9,10 @@ The sum uses the nodes and values of the solution itself. Forward mode (`_push`)
 Reverse mode (`_pull`) is the transpose: one constant vector `l` turned into each node's frame, `mu = -A^-1 R^T l`, and
 the derivative of `mu . L` in closed form (`virtual`). Both compute the values at the nodes again, block by block
 (`blocks`): keeping them from the first pass would take as long, and memory for all designs. What they are by are the
-masses, moments and so on of `components`; from there to the arrays of a robot JAX differentiates as usual.
+`Parameters` of `components`; from there to the arrays of a robot JAX differentiates as usual.
 """
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -20,7 +21,7 @@ import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
 from reojax._fast.blocks import Call, in_blocks
-from reojax._fast.components import Components
+from reojax._fast.components import Components, Known, Parameters, components, flattened, split
 from reojax._fast.momentum import angular_momentum
 from reojax._fast.nodes import NODES, path_nodes, sum_over_nodes, to_nodes, to_points
 from reojax._fast.omega import apply_symmetric, inverse, inward, solve
@@ -46,56 +47,55 @@ class Problem(NamedTuple):
     """What is known while tracing."""
 
     steps: int
-    structure: Any
-    """Of `Components`, as a tree."""
-    known: tuple[float | None, ...]
-    """Its entries, `None` for the ones given as data."""
-    varied: tuple[int, ...] = ()
-    """Entries of the data that a derivative is by."""
+    parent: tuple[int, ...]
+    known: Known
+    varied: tuple[bool, ...] = ()
+    """Which of the flattened parameters a derivative is by; the known ones among them do not change."""
     moved: bool = False
     """Whether it is by the path too."""
 
-    def robot(self, numbers: list[jax.Array]) -> Components:
-        """Put the data in its place."""
-        data = iter(numbers)
-        return jax.tree.unflatten(self.structure, [next(data) if k is None else k for k in self.known])
+    def robot(self, data: Sequence[jax.Array]) -> Components:
+        """Put the known numbers in the place of the data."""
+        return components([x if k is None else k for x, k in zip(data, self.known, strict=True)], self.parent)
 
 
-def steps_of_path(robot: Components, points: jax.Array, steps: int) -> Step:
+def steps_of_path(
+    parameters: Parameters, known: Known, parent: tuple[int, ...], points: jax.Array, steps: int
+) -> Step:
     """Rotation over each of the `steps` steps of each edge, in order."""
-    theta, rate = path_nodes(points, steps)
-    base = inward(robot, [sincos(a) for a in theta], rate)
-    return step_rotations(keep(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0])))
+    return _steps_of_path(Problem(steps, parent, known), flattened(parameters), points)
 
 
-def end_rotation(robot: Components, points: jax.Array, steps: int) -> jax.Array:
+def end_rotation(
+    parameters: Parameters, known: Known, parent: tuple[int, ...], points: jax.Array, steps: int
+) -> jax.Array:
     """Rotation (3, 3) after the polygon `points` (v, j), v >= 2; all arrays of one dtype."""
-    entries, structure = jax.tree.flatten(robot)
-    known = tuple(entry if isinstance(entry, int | float) else None for entry in entries)
-    numbers = [entry for entry in entries if not isinstance(entry, int | float)]
-    return _end_rotation(Problem(steps, structure, known), numbers, points)
+    return _end_rotation(Problem(steps, parent, known), parameters, points)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _end_rotation(problem: Problem, numbers: list[jax.Array], points: jax.Array) -> jax.Array:
+def _end_rotation(problem: Problem, parameters: Parameters, points: jax.Array) -> jax.Array:
     call = Call(_rotation, problem, ((3, 3),), _nodes(problem, points))
-    return in_blocks(call, _together(numbers, points), points)[0]
+    return in_blocks(call, flattened(parameters), points)[0]
 
 
 @partial(_end_rotation.defjvp, symbolic_zeros=True)
 def _end_rotation_jvp(problem, primals, tangents):
     rotation = _end_rotation(problem, *primals)
-    numbers, points = primals
-    by_numbers, by_points = tangents
-    varied = tuple(i for i, change in enumerate(by_numbers) if not isinstance(change, SymbolicZero))
-    problem = problem._replace(varied=varied, moved=not isinstance(by_points, SymbolicZero))
-    changes = ([jnp.stack([by_numbers[i] for i in varied])] if varied else []) + [by_points] * problem.moved
+    parameters, points = primals
+    by_parameters, by_points = tangents
+    varied = [change for change in by_parameters if not isinstance(change, SymbolicZero)]
+    problem = problem._replace(
+        varied=tuple(not isinstance(c, SymbolicZero) for c in by_parameters for _ in range(c.size)),
+        moved=not isinstance(by_points, SymbolicZero),
+    )
+    changes = ([flattened(varied)] if varied else []) + [by_points] * problem.moved
     if not changes:
         return rotation, jnp.zeros_like(rotation)
     joints = points.shape[1]
     nodes = _nodes(problem, points) * max(1, joints // 4)  # more values of each design are alive
     call = Call(_push, problem, ((3,),), nodes, transpose=_pull, linear=len(changes))
-    turn = in_blocks(call, _together(numbers, points), points, *changes)[0]
+    turn = in_blocks(call, flattened(parameters), points, *changes)[0]
     return rotation, jnp.cross(turn[:, None], rotation, axis=0)
 
 
@@ -104,7 +104,13 @@ def _nodes(problem: Problem, points: jax.Array) -> int:
 
 
 def _rotation(problem: Problem, numbers: jax.Array, points: jax.Array) -> list[jax.Array]:
-    return [to_matrix(product(steps_of_path(problem.robot(_apart(numbers)), points, problem.steps).rotation))]
+    return [to_matrix(product(_steps_of_path(problem, numbers, points).rotation))]
+
+
+def _steps_of_path(problem: Problem, numbers: jax.Array, points: jax.Array) -> Step:
+    theta, rate = path_nodes(points, problem.steps)
+    base = inward(problem.robot(split(numbers)), [sincos(a) for a in theta], rate)
+    return step_rotations(keep(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0])))
 
 
 class Solution(NamedTuple):
@@ -141,22 +147,23 @@ def _solution(problem: Problem, data: list[jax.Array], points: jax.Array) -> Sol
 
 def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax.Array) -> list[jax.Array]:
     """How the end turns, seen from the start, with changes of the data and of the path."""
-    data = _apart(numbers)
+    data = split(numbers)
     known = _solution(problem, data, points)
     like = known.theta[0]
+    places = [i for i, varied in enumerate(problem.varied) if varied]
 
     def momentum(varied, points):
         now = [to_nodes(value, like) for value in data]
-        for i, value in zip(problem.varied, varied, strict=True):
+        for i, value in zip(places, varied, strict=True):
             now[i] = to_nodes(value, like)
         theta, rate = path_nodes(points, problem.steps)
         fixed = (known.omega, known.velocity, known.centre)
         return _at_nodes(angular_momentum(problem.robot(now), [sincos(a) for a in theta], rate, *fixed), like)
 
     given = iter(changes)
-    by_data = _apart(next(given)) if problem.varied else []
+    by_data = split(next(given)) if places else []
     by_points = next(given) if problem.moved else jnp.zeros_like(points)
-    _, change = jax.jvp(momentum, ([data[i] for i in problem.varied], points), (by_data, by_points))
+    _, change = jax.jvp(momentum, ([data[i] for i in places], points), (by_data, by_points))
     change_of_omega = keep(_at_nodes(apply_symmetric(known.inverse, scale(-1, change)), like))
     in_step = keep(mean_over_step(known.step.inside(change_of_omega)))
     x, y, z = (c.sum() for c in rotate(known.to_step, in_step))
@@ -165,40 +172,30 @@ def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax
 
 def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.Array) -> list[jax.Array]:
     """Transpose of `_push`: what the scalar product of `by_turn` with the end's turn changes by."""
-    data = _apart(numbers)
+    data = split(numbers)
     robot = problem.robot(data)
     known = _solution(problem, data, points)
     like = known.theta[0]
-    in_step = keep(rotate(conjugate(known.to_step), tuple(_apart(by_turn))))
+    in_step = keep(rotate(conjugate(known.to_step), tuple(split(by_turn))))
     by_omega = known.step.back(in_step)
     mu = keep(_at_nodes(apply_symmetric(known.inverse, scale(-1, by_omega)), like))
     of = slopes(robot, known.sine_cosine, known.rate, known.omega, known.velocity, known.centre, mu)
     found = []
-    if problem.varied:
-        by_entry, loops = (
-            [leaf for leaf, known in zip(jax.tree.leaves(tree), problem.known, strict=True) if known is None]
-            for tree in (of.robot, together(robot))
-        )
+    if any(problem.varied):
+        by_entry, loops = jax.tree.leaves(of.robot), jax.tree.leaves(together(robot))
+        unknown = [i for i, varied in enumerate(problem.varied) if varied and problem.known[i] is None]
         sums: dict[int, jax.Array] = {}
-        for loop in dict.fromkeys(loops[i] for i in problem.varied):
-            places = [i for i in problem.varied if loops[i] == loop]
+        for loop in dict.fromkeys(loops[i] for i in unknown):
+            places = [i for i in unknown if loops[i] == loop]
             values = _at_nodes([by_entry[i] for i in places], like)
             sums |= zip(places, sum_over_nodes(values), strict=True)
-        found.append(jnp.stack([sums[i] for i in problem.varied]))
+        zero = jnp.zeros((), like.dtype)
+        found.append(jnp.stack([sums.get(i, zero) for i, varied in enumerate(problem.varied) if varied]))
     if problem.moved:
         by_nodes = [keep(_at_nodes(of_joint, like)) for of_joint in zip(of.theta, of.rate, strict=True)]
         by_theta, by_rate = ([pair[i] for pair in by_nodes] for i in (0, 1))
         found.append(to_points(by_theta, by_rate, points, problem.steps))
     return found
-
-
-def _together(numbers: list[jax.Array], like: jax.Array) -> jax.Array:
-    return jnp.stack(numbers) if numbers else jnp.zeros(0, like.dtype)
-
-
-def _apart(numbers: jax.Array) -> list[jax.Array]:
-    # `split`, unlike indexing, has a cheap transpose: one concatenation
-    return [x.reshape(()) for x in jax.lax.split(numbers, (1,) * numbers.size)] if numbers.size else []
 
 
 def _at_nodes(vector, like: jax.Array) -> Triple:

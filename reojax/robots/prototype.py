@@ -185,23 +185,34 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
     wanted = cast(inertia)
     if wanted.shape or (is_concrete(wanted) and not 0 < wanted < np.inf):
         raise ValueError(f"`inertia` is {wanted}; it must be one positive, finite number, in kg m^2.")
-    mass, com, moment, axes, anchor = map(cast, (robot.mass, robot.com, robot.inertia, robot.axis, robot.anchor))
-    eye = np.eye(3, dtype=com.dtype)
+    mass, com, moment, axes, anchor = map(
+        _like(robot)[1], (robot.mass, robot.com, robot.inertia, robot.axis, robot.anchor)
+    )
 
     def stretched(link: int, axis: Any, point: Any) -> tuple[Any, Any]:
+        """Centre of mass and inertia: polynomials in the factor by which the mass moves."""
         along = axis[:, None] * axis[None, :]
-        across = eye - along
+        across = np.eye(3, dtype=com.dtype) - along
         lever = com[link] - point
-        present = (along * moment[link]).sum() + mass[link] * (lever @ across @ lever)
-        stretch = xp.sqrt(wanted / present) * across + along
-        spread = stretch @ (xp.trace(moment[link]) / 2 * eye - moment[link]) @ stretch  # second moments of mass
-        return point + stretch @ lever, xp.trace(spread) * eye - spread
+        still, moving = point + along @ lever, across @ lever
+        factor = xp.sqrt(wanted / cast((along * moment[link]).sum() + mass[link] * (moving @ moving)))
+
+        def inertia(left: Any, right: Any) -> Any:
+            """Share of `left @ spread @ right` in the inertia, `spread` being the second moments of the mass."""
+            part = left @ (moment[link].trace() / 2 * np.eye(3, dtype=com.dtype) - moment[link]) @ right
+            return cast(part.trace() * np.eye(3, dtype=com.dtype) - part)
+
+        mixed = inertia(along, across) + inertia(across, along)
+        return (
+            cast(still) + factor * cast(moving),
+            inertia(along, along) + factor * (mixed + factor * inertia(across, across)),
+        )
 
     with jax.default_matmul_precision("highest"):  # or a GPU takes 10 bits of float32
-        first, last = stretched(0, axes[0], anchor[0]), stretched(3, axes[2], xp.zeros_like(com[3]))
+        first, last = stretched(0, axes[0], anchor[0]), stretched(3, axes[2], np.zeros(3, com.dtype))
     return robot.replace(
-        com=xp.stack([first[0], com[1], com[2], last[0]]),
-        inertia=xp.stack([first[1], moment[1], moment[2], last[1]]),
+        com=xp.stack([first[0], *cast(com[1:3]), last[0]]),
+        inertia=xp.stack([first[1], *cast(moment[1:3]), last[1]]),
     )
 
 
@@ -244,9 +255,9 @@ def _per_joint(robot: Robot, entry: str, value: ArrayLike, least: float = -np.in
     return xp.broadcast_to(array, (robot.joints,))
 
 
-def _like(robot: Robot, value: Any) -> tuple[Any, Any]:
+def _like(robot: Robot, *values: Any) -> tuple[Any, Any]:
     """Array module and cast for an edit: NumPy unless JAX arrays are about, and the lowest float around."""
-    leaves = [leaf for leaf in (*jax.tree.leaves(robot), value) if hasattr(leaf, "dtype")]
+    leaves = [leaf for leaf in (*jax.tree.leaves(robot), *values) if hasattr(leaf, "dtype")]
     xp = jnp if any(isinstance(leaf, jax.Array) for leaf in leaves) else np
     floats = [leaf.dtype for leaf in leaves if jnp.issubdtype(leaf.dtype, jnp.floating)]
     dtype = min(floats, key=lambda d: d.itemsize)
