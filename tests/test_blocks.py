@@ -80,7 +80,7 @@ def test_derivatives_by_the_other_arguments():
 
 def test_net_rotations_and_gradients_in_blocks():
     """Of more designs than two blocks, an odd number, with the robot shared: the numbers of a small batch."""
-    robot, designs, steps = robots.planar(2), 265, 16
+    robot, designs, steps = robots.planar(2), 265, 64
     assert designs > 2 * _BYTES // 8 // (steps * len(GAUSS_NODES))
     corners = np.cumsum(numbers(designs, 2, robot.joints), axis=1)
 

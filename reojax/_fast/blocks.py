@@ -17,8 +17,9 @@ import jax.numpy as jnp
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
-_BYTES = 2**17
-"""Of one intermediate value of a block. (Smaller blocks were no faster; the loop has its costs.)
+_BYTES = 2**19
+"""Of one intermediate value of a block, where few are alive at once. (Smaller blocks are no faster: XLA splits each
+large operation between two threads, which costs some 30 us.)
 
 The number of designs in a block is made odd: arrays whose size is a power of two begin at the same place of the cache,
 and some ten that are read side by side drive one another out; a gradient took 1.3 times as long.
@@ -34,7 +35,7 @@ class Call(NamedTuple):
     shapes: tuple[tuple[int, ...], ...]
     """Of the results, for one design."""
     nodes: int
-    """Elements of a typical intermediate value of one design."""
+    """Elements of a typical intermediate value of one design; times as many, where many values are alive at once."""
     transpose: Callable[..., Sequence[jax.Array]] | None = None
     """The same arguments with cotangents of the results in the place of the last `linear` ones, to theirs."""
     linear: int = 0

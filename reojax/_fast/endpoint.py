@@ -75,7 +75,8 @@ def end_rotation(
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _end_rotation(problem: Problem, parameters: Parameters, points: jax.Array) -> jax.Array:
-    call = Call(_rotation, problem, ((3, 3),), _nodes(problem, points))
+    alive = 1 if points.shape[1] <= 4 else 4
+    call = Call(_rotation, problem, ((3, 3),), alive * _nodes(problem, points))
     return in_blocks(call, flattened(parameters), points)[0]
 
 
@@ -92,14 +93,14 @@ def _end_rotation_jvp(problem, primals, tangents):
     changes = ([flattened(varied)] if varied else []) + [by_points] * problem.moved
     if not changes:
         return rotation, jnp.zeros_like(rotation)
-    joints = points.shape[1]
-    nodes = _nodes(problem, points) * max(1, joints // 4)  # more values of each design are alive
-    call = Call(_push, problem, ((3,),), nodes, transpose=_pull, linear=len(changes))
+    alive = max(4, points.shape[1])
+    call = Call(_push, problem, ((3,),), alive * _nodes(problem, points), transpose=_pull, linear=len(changes))
     turn = in_blocks(call, flattened(parameters), points, *changes)[0]
     return rotation, jnp.cross(turn[:, None], rotation, axis=0)
 
 
 def _nodes(problem: Problem, points: jax.Array) -> int:
+    """Size of a value at all nodes. (Blocks are smaller the more of them are `alive` at once, as measured.)"""
     return (points.shape[0] - 1) * problem.steps * len(NODES)
 
 
