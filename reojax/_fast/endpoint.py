@@ -59,9 +59,7 @@ class Problem(NamedTuple):
         return components([x if k is None else k for x, k in zip(data, self.known, strict=True)], self.parent)
 
 
-def steps_of_path(
-    parameters: Parameters, known: Known, parent: tuple[int, ...], points: jax.Array, steps: int
-) -> Step:
+def steps_of_path(parameters: Parameters, known: Known, parent: tuple[int, ...], points: jax.Array, steps: int) -> Step:
     """Rotation over each of the `steps` steps of each edge, in order."""
     return _steps_of_path(Problem(steps, parent, known), flattened(parameters), points)
 
@@ -195,7 +193,7 @@ def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.
     if problem.moved:
         by_nodes = [keep(_at_nodes(of_joint, like)) for of_joint in zip(of.theta, of.rate, strict=True)]
         by_theta, by_rate = ([pair[i] for pair in by_nodes] for i in (0, 1))
-        found.append(to_points(by_theta, by_rate, points, problem.steps))
+        found.append(to_points(by_theta, by_rate, problem.steps))
     return found
 
 

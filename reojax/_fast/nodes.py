@@ -24,14 +24,16 @@ LEGENDRE: np.ndarray = np.polynomial.legendre.legvander(_x, len(_x) - 1)
 
 
 def per_step(values: jax.Array, matrix: np.ndarray) -> jax.Array:
-    """Multiply the values in each step, (steps, n), by a constant (n, m) matrix."""
+    """Multiply the values in each step, or in each edge, (steps, n), by a constant (n, m) matrix."""
     constant = jnp.asarray(matrix, values.dtype)
     return jax.lax.dot(values.reshape(-1, matrix.shape[0]), constant, precision=jax.lax.Precision.HIGHEST)
 
 
 def path_nodes(points: jax.Array, steps: int) -> tuple[list[jax.Array], list[jax.Array]]:
     """Joint angles and their rates per step at all nodes of the polygon `points` (v, j), joint by joint."""
-    start, rate = _lines(points, steps)
+    rate = (points[1:] - points[:-1])[:, None, :] / steps
+    start = points[:-1, None, :] + rate * jnp.arange(steps, dtype=points.dtype)[None, :, None]
+    rate = jnp.broadcast_to(rate, start.shape)
     theta, theta_dot = [], []
     for k in range(points.shape[1]):
         a, b = (x[:, None] for x in keep((start[..., k].reshape(-1), rate[..., k].reshape(-1))))
@@ -42,23 +44,16 @@ def path_nodes(points: jax.Array, steps: int) -> tuple[list[jax.Array], list[jax
     return theta, theta_dot
 
 
-def to_points(theta: list[jax.Array], rate: list[jax.Array], points: jax.Array, steps: int) -> jax.Array:
+def to_points(theta: list[jax.Array], rate: list[jax.Array], steps: int) -> jax.Array:
     """Transpose of `path_nodes`: from cotangents of all angles and rates to that of the points (v, j)."""
-    ones = np.ones((len(NODES), 1))
-    by_start = [per_step(x, ones) for x in theta]
-    by_rate = [per_step(x, NODES[:, None]) + per_step(y, ones) for x, y in zip(theta, rate, strict=True)]
-    shape = (points.shape[0] - 1, steps, points.shape[1])
-    lines = [jnp.concatenate(columns, axis=1).reshape(shape) for columns in (by_start, by_rate)]
-    (found,) = jax.linear_transpose(lambda points: _lines(points, steps), points)(tuple(lines))
-    return found
-
-
-def _lines(points: jax.Array, steps: int) -> tuple[jax.Array, jax.Array]:
-    """Angles at the start of each step and their rate per step, (edges, steps, j) both."""
-    rate = (points[1:] - points[:-1])[:, None, :] / steps
-    index = jnp.arange(steps, dtype=points.dtype)[None, :, None]
-    start = points[:-1, None, :] + rate * index
-    return start, jnp.broadcast_to(rate, start.shape)
+    along = ((np.arange(steps)[:, None] + NODES) / steps).reshape(-1, 1)
+    ends_of_theta = np.hstack([1 - along, along])
+    ends_of_rate = np.tile([[-1 / steps, 1 / steps]], (len(along), 1))
+    found = []
+    for x, y in zip(theta, rate, strict=True):
+        ends = per_step(x, ends_of_theta) + per_step(y, ends_of_rate)  # of each edge
+        found.append(jnp.pad(ends[:, 0], (0, 1)) + jnp.pad(ends[:, 1], (1, 0)))
+    return jnp.stack(found, axis=1)
 
 
 @jax.custom_jvp

@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 
+from reojax._fast.scalar import cross, dot, mul, plus, sub, times as scale
 from reojax._fast.store import keep
 
 Quaternion = tuple[jax.Array, ...]
@@ -13,23 +14,15 @@ Triple = tuple[jax.Array, ...]
 
 def times(a: Quaternion, b: Quaternion) -> Quaternion:
     """Return the quaternion of the rotation `a b`: in the frame that `a` made, do `b`."""
-    return (
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-    )
+    (s, *u), (t, *v) = a, b
+    return sub(mul(s, t), dot(u, v)), *plus(plus(scale(s, v), scale(t, u)), cross(u, v))
 
 
 def rotate(q: Quaternion, v: Triple) -> Triple:
     """Return the vector `v` turned by the unit quaternion `q`."""
-    w, x, y, z = q
-    tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
-    return (
-        v[0] + w * tx + y * tz - z * ty,
-        v[1] + w * ty + z * tx - x * tz,
-        v[2] + w * tz + x * ty - y * tx,
-    )
+    w, *u = q
+    twice = scale(2, cross(u, v))
+    return plus(plus(v, scale(w, twice)), cross(u, twice))
 
 
 def conjugate(q: Quaternion) -> Quaternion:

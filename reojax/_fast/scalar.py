@@ -7,6 +7,7 @@ with a known 0 cost nothing, which XLA itself may not do: in floating point 0 * 
 from typing import TypeAlias
 
 import jax
+import numpy as np
 
 Scalar: TypeAlias = jax.Array | float | int
 Vector: TypeAlias = tuple[Scalar, ...]
@@ -33,8 +34,10 @@ def mul(a: Scalar, b: Scalar) -> Scalar:
         if a == 1:
             return b
         if a == -1:
-            return -b
-    return a * b
+            return -b if _known(b) else jax.lax.neg(b)
+        if _known(b):
+            return a * b
+    return jax.lax.mul(*_alike(a, b))
 
 
 def add(a: Scalar, b: Scalar) -> Scalar:
@@ -43,7 +46,21 @@ def add(a: Scalar, b: Scalar) -> Scalar:
         return b
     if _known(b) and b == 0:
         return a
-    return a + b
+    if _known(a) and _known(b):
+        return a + b
+    return jax.lax.add(*_alike(a, b))
+
+
+def _alike(a: Scalar, b: Scalar) -> tuple[jax.Array, jax.Array]:
+    """Both as arrays of one shape. (The operators of `jax.numpy` do it too, but take most of the time of tracing.)"""
+    if _known(a):
+        a = np.asarray(a, b.dtype)
+    elif _known(b):
+        b = np.asarray(b, a.dtype)
+    if a.shape != b.shape:
+        shape = a.shape or b.shape
+        a, b = (x if x.shape == shape else jax.lax.broadcast_in_dim(x, shape, ()) for x in (a, b))
+    return a, b
 
 
 def sub(a: Scalar, b: Scalar) -> Scalar:

@@ -27,6 +27,7 @@ import numpy as np
 
 from reojax._fast.nodes import LEGENDRE, NODES, WEIGHTS, per_step
 from reojax._fast.product import Quaternion, Triple, times
+from reojax._fast.scalar import cross, dot, mul, plus, times as scale
 from reojax._fast.sincos import horner, sincos
 from reojax._fast.store import keep
 
@@ -58,14 +59,6 @@ _SERIES_END = 10.0
 """Angles within a step stay below this root (180 degrees) or the step is too long for eight nodes anyway."""
 
 
-def _dot(a: Triple, b: Triple) -> jax.Array:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Triple, b: Triple) -> Triple:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
 def _at_nodes(values: Triple, matrix: np.ndarray) -> Triple:
     x, y, z = (per_step(v, matrix).reshape(-1) for v in values)
     return x, y, z
@@ -74,11 +67,7 @@ def _at_nodes(values: Triple, matrix: np.ndarray) -> Triple:
 def _moments(values: Triple, count: int) -> list[Triple]:
     """Integrals over each step of three arrays of nodes, times the first Legendre polynomials."""
     x, y, z = (per_step(v, _MOMENTS[:, :1] if count == 1 else _MOMENTS) for v in values)
-    return [(x[:, n], y[:, n], z[:, n]) for n in range(count)]
-
-
-def _combine(*terms: tuple[jax.Array | float, Triple]) -> Triple:
-    return tuple(sum((c * v[i] for c, v in terms[1:]), start=terms[0][0] * terms[0][1][i]) for i in range(3))
+    return [tuple(jax.lax.index_in_dim(v, n, axis=1, keepdims=False) for v in (x, y, z)) for n in range(count)]
 
 
 class Step(NamedTuple):
@@ -102,17 +91,19 @@ def step_rotations(omega: Triple) -> Step:
     """
     s = jnp.asarray(np.tile(NODES - 0.5, omega[0].shape[0] // len(NODES)), omega[0].dtype)
     mean = _at_nodes(omega, _MEAN_AT_NODES)
-    u = keep(_rotate(_combine((s, mean)), _combine((1.0, omega), (-1.0, mean))))
+    u = keep(_rotate(scale(s, mean), plus(omega, scale(-1, mean))))
     turned = _at_nodes(u, _INTEGRAL)
     v = keep(_fer(u, turned))
     m = _moments(v, _USED)
-    first = _combine((1.0, m[0]), *((0.5, _cross(a, b)) for a, b in pairwise(m)))
-    half = keep(_exp(_combine((0.5, _moments(omega, 1)[0]))))
+    first = m[0]
+    for a, b in pairwise(m):
+        first = plus(first, scale(0.5, cross(a, b)))
+    half = keep(_exp(scale(0.5, _moments(omega, 1)[0])))
     inner = keep(times(_exp_small(first), _exp_small(_moments(u, 1)[0])))
     rotation = keep(times(times(half, inner), half))
 
     def turns() -> tuple[Triple, ...]:
-        return _combine((s, mean)), turned, _at_nodes(v, _INTEGRAL)
+        return scale(s, mean), turned, _at_nodes(v, _INTEGRAL)
 
     def inside(vectors: Triple) -> Triple:
         for turn in turns():
@@ -122,7 +113,7 @@ def step_rotations(omega: Triple) -> Step:
     def back(vectors: Triple) -> Triple:
         vectors = keep(_at_nodes(vectors, _SHARES))
         for turn in reversed(turns()):
-            vectors = _rotate(_combine((-1.0, turn)), vectors)
+            vectors = _rotate(scale(-1, turn), vectors)
         return keep(vectors)
 
     return Step(rotation, half, inside, back)
@@ -135,30 +126,29 @@ def mean_over_step(values: Triple) -> Triple:
 
 def _rotate(by: Triple, vectors: Triple) -> Triple:
     """Turn vectors by rotation vectors below a half turn: `v + sinc b x v + cosc b x (b x v)`, by power series."""
-    square = jnp.minimum(_dot(by, by), _SERIES_END)
-    p = _cross(by, vectors)
-    return _combine((1.0, vectors), (horner(_SIN1, square), p), (horner(_COS2, square), _cross(by, p)))
+    square = jnp.minimum(dot(by, by), _SERIES_END)
+    p = cross(by, vectors)
+    return plus(vectors, plus(scale(horner(_SIN1, square), p), scale(horner(_COS2, square), cross(by, p))))
 
 
 def _fer(u: Triple, turned: Triple) -> Triple:
-    square = jnp.minimum(_dot(turned, turned), _SERIES_END)
-    p = _cross(turned, u)
-    return _combine((horner(_FER_1, square), p), (horner(_FER_2, square), _cross(turned, p)))
+    square = jnp.minimum(dot(turned, turned), _SERIES_END)
+    p = cross(turned, u)
+    return plus(scale(horner(_FER_1, square), p), scale(horner(_FER_2, square), cross(turned, p)))
 
 
 def _exp_small(vector: Triple) -> Quaternion:
     """Quaternion of a rotation vector below a turn, by power series."""
-    square = jnp.minimum(0.25 * _dot(vector, vector), _SERIES_END)
-    k = 0.5 * horner(_SIN1, square)
-    return horner(_COS0, square), k * vector[0], k * vector[1], k * vector[2]
+    square = jnp.minimum(0.25 * dot(vector, vector), _SERIES_END)
+    return horner(_COS0, square), *scale(mul(0.5, horner(_SIN1, square)), vector)
 
 
 def _exp(vector: Triple) -> Quaternion:
     """Quaternion of a rotation vector of any length."""
-    square = 0.25 * _dot(vector, vector)
+    square = 0.25 * dot(vector, vector)
     small = square < 1e-4
     angle = jnp.sqrt(jnp.where(small, 1.0, square))
     s, c = sincos(angle)
     near = jnp.where(small, square, 0.0)
     k = 0.5 * jnp.where(small, horner(_SIN1[:4], near), s / angle)
-    return jnp.where(small, horner(_COS0[:4], near), c), k * vector[0], k * vector[1], k * vector[2]
+    return jnp.where(small, horner(_COS0[:4], near), c), *scale(k, vector)
