@@ -24,7 +24,7 @@ from reojax._fast.blocks import Call, in_blocks
 from reojax._fast.components import Components, Known, Parameters, components, flattened, split
 from reojax._fast.momentum import angular_momentum
 from reojax._fast.nodes import NODES, path_nodes, sum_over_nodes, to_nodes, to_points
-from reojax._fast.omega import apply_symmetric, inverse, inward, solve
+from reojax._fast.omega import inward, solve
 from reojax._fast.product import (
     Quaternion,
     Triple,
@@ -118,8 +118,8 @@ class Solution(NamedTuple):
     theta: list[jax.Array]
     rate: list[jax.Array]
     sine_cosine: list[Any]
-    inverse: Symmetric
-    """Of `A`."""
+    inertia: Symmetric
+    """`A`."""
     centre: Vector
     omega: Triple
     velocity: Any
@@ -136,12 +136,12 @@ def _solution(problem: Problem, data: list[jax.Array], points: jax.Array) -> Sol
     base = inward(robot, sine_cosine, rate, by_joint=not robot.axes_known)
     moving = keep((*base.momentum, *base.drift))
     centre, drift = keep(base.centre), moving[3:]
-    inverse_of_inertia = keep(inverse(keep(base.inertia)))
-    omega = keep(_at_nodes(apply_symmetric(inverse_of_inertia, scale(-1, moving[:3])), theta[0]))
-    velocity = scale(-1, plus(drift, cross(omega, centre)))
+    inertia = keep(base.inertia)
+    omega = keep(_at_nodes(solve(inertia, scale(-1, moving[:3])), theta[0]))
+    velocity = keep(scale(-1, plus(drift, cross(omega, centre))))
     step = step_rotations(omega)
     to_step = keep(times(shifted(products_up_to(step.rotation), 1), step.half))
-    return Solution(theta, rate, sine_cosine, inverse_of_inertia, centre, omega, velocity, step, to_step)
+    return Solution(theta, rate, sine_cosine, inertia, centre, omega, velocity, step, to_step)
 
 
 def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax.Array) -> list[jax.Array]:
@@ -163,7 +163,7 @@ def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax
     by_data = split(next(given)) if places else []
     by_points = next(given) if problem.moved else jnp.zeros_like(points)
     _, change = jax.jvp(momentum, ([data[i] for i in places], points), (by_data, by_points))
-    change_of_omega = keep(_at_nodes(apply_symmetric(known.inverse, scale(-1, change)), like))
+    change_of_omega = keep(_at_nodes(solve(known.inertia, scale(-1, change)), like))
     in_step = keep(mean_over_step(known.step.inside(change_of_omega)))
     x, y, z = (c.sum() for c in rotate(known.to_step, in_step))
     return [jnp.stack([x, y, z])]
@@ -177,7 +177,7 @@ def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.
     like = known.theta[0]
     in_step = keep(rotate(conjugate(known.to_step), tuple(split(by_turn))))
     by_omega = known.step.back(in_step)
-    mu = keep(_at_nodes(apply_symmetric(known.inverse, scale(-1, by_omega)), like))
+    mu = keep(_at_nodes(solve(known.inertia, scale(-1, by_omega)), like))
     of = slopes(robot, known.sine_cosine, known.rate, known.omega, known.velocity, known.centre, mu)
     found = []
     if any(problem.varied):

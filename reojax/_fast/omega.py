@@ -129,17 +129,10 @@ def _shift(mass: Scalar, moment: Vector, a: Vector) -> Symmetric:
     return (*times(2, (add(y, z), add(x, z), add(x, y))), *times(-1, products))
 
 
-def inverse(A: Symmetric) -> Symmetric:
-    """Return the inverse of a symmetric positive definite matrix."""
-    adjugate, determinant = _adjugate(A)
-    return times(1 / determinant, adjugate)
-
-
 def solve(A: Symmetric, right: Vector) -> Vector:
     """Solve `A x = right`, `A` symmetric positive definite."""
     adjugate, determinant = _adjugate(A)
-    x, y, z = apply_symmetric(adjugate, right)
-    return x / determinant, y / determinant, z / determinant
+    return times(1 / determinant, apply_symmetric(adjugate, right))
 
 
 def _adjugate(A: Symmetric) -> tuple[Symmetric, Scalar]:
