@@ -1,5 +1,7 @@
 """The optimiser behind the fastest motions: least duration, motors within their curves, joints within their limits."""
 
+from __future__ import annotations
+
 import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -5,6 +5,8 @@ method of sixth order in seven stages (J. C. Butcher, J. Austral. Math. Soc. 4, 
 of each step (H. Munthe-Kaas, Appl. Numer. Math. 29, 1999), so that R stays a rotation to rounding.
 """
 
+from __future__ import annotations
+
 from typing import Any
 
 import jax

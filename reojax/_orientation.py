@@ -1,5 +1,7 @@
 """Orientation along a path in three angles that start at zero and do not jump."""
 
+from __future__ import annotations
+
 import numpy as np
 from jaxtyping import Float
 

@@ -5,6 +5,8 @@ is known where its joints are farthest; each step here is the least change of th
 net rotation right and leaves no joint beyond its limits.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 

@@ -1,5 +1,7 @@
 """Linear algebra of small matrices. Batched LAPACK calls can deadlock on CPU, so nothing here uses any."""
 
+from __future__ import annotations
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float

@@ -1,5 +1,7 @@
 """The smoothest curve through points: the spline of least jerk, of polynomials of degree five."""
 
+from __future__ import annotations
+
 import jax
 import jax.numpy as jnp
 import numpy as np

@@ -13,6 +13,8 @@ What the fit does not know has two sources: the scatter of the residuals, and th
 pushes all later orientations the same way. The covariance has both.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from functools import partial
 from typing import Any, NamedTuple

@@ -12,6 +12,8 @@ with either or both of joints and orientation. Every angle's header says its uni
 a cell left empty (or NaN): that is a gap.
 """
 
+from __future__ import annotations
+
 import csv
 import math
 import os

@@ -7,6 +7,8 @@ Jacobian, no `A`, no `B` and no angular velocity of the solver's enters, only po
 a mistake in any of those shows.
 """
 
+from __future__ import annotations
+
 from fractions import Fraction
 from functools import partial
 from math import prod

@@ -5,6 +5,8 @@ shifted in time to where it fits best, by less than a frame too, and then both o
 the robot starts.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 

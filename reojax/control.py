@@ -12,6 +12,8 @@ that momentum is conserved by construction. Both are integrated by Runge-Kutta s
 vector of each step.
 """
 
+from __future__ import annotations
+
 from functools import partial
 from typing import NamedTuple
 

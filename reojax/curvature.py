@@ -1,5 +1,7 @@
 """Curvature of the local connection: how much a small loop in shape space turns the robot, and about which axis."""
 
+from __future__ import annotations
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float

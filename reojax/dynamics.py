@@ -15,6 +15,8 @@ its joint's axis `e` relative to the link that carries it (`s` is plus or minus 
 to the energy, `w` being the stator link's angular velocity: its inertia as a part of that link is the link's.
 """
 
+from __future__ import annotations
+
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp

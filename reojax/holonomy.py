@@ -5,6 +5,8 @@ depends on the path alone, not on how fast it is run (thesis 2.4). Along each st
 `R' = R hat(omega)` is solved on the rotation group, from the identity.
 """
 
+from __future__ import annotations
+
 from functools import partial
 
 import jax

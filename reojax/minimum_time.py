@@ -6,6 +6,8 @@ voltage in `b`, and friction in `c`; the least `T` for which it stays within the
 slower runs, solves a quadratic equation. The least time of a motion is the largest over its instants.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple

@@ -15,6 +15,8 @@ the last sum over the motors' rotors, which spin about their joints' axes `e_k` 
 links that carry them.
 """
 
+from __future__ import annotations
+
 from typing import Any, NamedTuple
 
 import jax

@@ -4,6 +4,8 @@ The joints go as a trajectory says. The base turns as the angular momentum says:
 `omega = A^-1 (B theta_dot + R^T H)` with the momentum `H` constant in inertial space, so nothing can drift.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple

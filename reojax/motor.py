@@ -12,6 +12,8 @@ While motoring the last line is the torque-speed line `|M| <= M_stall (1 - w / w
 more, up to `M_stall (1 + w / w_0)`, which current limits of the electronics, not modelled, may cut.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -1,5 +1,7 @@
 """Paths in shape space: what the joints go through, without when (thesis 2.4: only the path matters)."""
 
+from __future__ import annotations
+
 import dataclasses
 
 import jax

@@ -9,6 +9,8 @@ or the air that it catches) and resists turning with a moment `c` per angular ve
 nor momentum this is thesis eq. 2.14, and time does not matter; with them it does.
 """
 
+from __future__ import annotations
+
 from functools import partial
 from typing import NamedTuple
 

@@ -5,6 +5,8 @@ Link 0 is the base (link 1 of the thesis). Joint `k` carries link `k + 1` and ha
 `k + 1` has its origin on joint `k`. SI units throughout.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Sequence
 from typing import Any, Literal

@@ -12,6 +12,8 @@ ones do not underflow when squared. Products are written out: a float32 matrix p
 fewer digits on an accelerator.
 """
 
+from __future__ import annotations
+
 import math
 
 import jax

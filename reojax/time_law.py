@@ -4,6 +4,8 @@ A law is a piecewise polynomial, so that its derivatives are exact and its corne
 matters for the net rotation (thesis 2.4); the law decides what torques and speeds it takes.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -4,6 +4,8 @@ A path with a time law for each edge makes one (`along`), and so does a smooth c
 given times (`through`), which is another path: it rounds the corners.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from math import comb
 from typing import NamedTuple

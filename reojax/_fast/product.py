@@ -14,15 +14,15 @@ Triple = tuple[jax.Array, ...]
 
 def times(a: Quaternion, b: Quaternion) -> Quaternion:
     """Return the quaternion of the rotation `a b`: in the frame that `a` made, do `b`."""
-    (s, *u), (t, *v) = a, b
+    s, u, t, v = a[0], a[1:], b[0], b[1:]
     return sub(mul(s, t), dot(u, v)), *plus(plus(scale(s, v), scale(t, u)), cross(u, v))
 
 
 def rotate(q: Quaternion, v: Triple) -> Triple:
     """Return the vector `v` turned by the unit quaternion `q`."""
-    w, *u = q
+    u = q[1:]
     twice = scale(2, cross(u, v))
-    return plus(plus(v, scale(w, twice)), cross(u, twice))
+    return plus(plus(v, scale(q[0], twice)), cross(u, twice))
 
 
 def conjugate(q: Quaternion) -> Quaternion:

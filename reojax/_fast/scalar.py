@@ -4,7 +4,7 @@ A scalar is a Python number (known while tracing) or an array. Products with a k
 with a known 0 cost nothing, which XLA itself may not do: in floating point 0 * x is not always 0.
 """
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import jax
 import numpy as np
@@ -24,7 +24,7 @@ def _known(a: Scalar) -> bool:
     return isinstance(a, int | float)
 
 
-def mul(a: Scalar, b: Scalar) -> Scalar:
+def mul(a: Scalar, b: Scalar) -> Any:
     """Return `a * b`."""
     if _known(b) and not _known(a):
         a, b = b, a
@@ -40,7 +40,7 @@ def mul(a: Scalar, b: Scalar) -> Scalar:
     return jax.lax.mul(*_alike(a, b))
 
 
-def add(a: Scalar, b: Scalar) -> Scalar:
+def add(a: Scalar, b: Scalar) -> Any:
     """Return `a + b`."""
     if _known(a) and a == 0:
         return b
@@ -51,7 +51,7 @@ def add(a: Scalar, b: Scalar) -> Scalar:
     return jax.lax.add(*_alike(a, b))
 
 
-def _alike(a: Scalar, b: Scalar) -> tuple[jax.Array, jax.Array]:
+def _alike(a: Any, b: Any) -> tuple[jax.Array, jax.Array]:
     """Both as arrays of one shape. (The operators of `jax.numpy` do it too, but take most of the time of tracing.)"""
     if _known(a):
         a = np.asarray(a, b.dtype)
@@ -63,17 +63,17 @@ def _alike(a: Scalar, b: Scalar) -> tuple[jax.Array, jax.Array]:
     return a, b
 
 
-def sub(a: Scalar, b: Scalar) -> Scalar:
+def sub(a: Scalar, b: Scalar) -> Any:
     """Return `a - b`."""
     return add(a, mul(-1, b))
 
 
-def dot(a: Vector, b: Vector) -> Scalar:
+def dot(a: Vector, b: Vector) -> Any:
     """Return the scalar product of two triples."""
     return add(add(mul(a[0], b[0]), mul(a[1], b[1])), mul(a[2], b[2]))
 
 
-def cross(a: Vector, b: Vector) -> Vector:
+def cross(a: Vector, b: Vector) -> tuple[Any, ...]:
     """Return the vector product."""
     return (
         sub(mul(a[1], b[2]), mul(a[2], b[1])),
@@ -82,12 +82,12 @@ def cross(a: Vector, b: Vector) -> Vector:
     )
 
 
-def plus(a: tuple[Scalar, ...], b: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+def plus(a: tuple[Scalar, ...], b: tuple[Scalar, ...]) -> tuple[Any, ...]:
     """Return the sum of two vectors, or of two symmetric matrices."""
     return tuple(add(x, y) for x, y in zip(a, b, strict=True))
 
 
-def times(s: Scalar, a: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+def times(s: Scalar, a: tuple[Scalar, ...]) -> tuple[Any, ...]:
     """Return a vector or a symmetric matrix scaled by `s`."""
     return tuple(mul(s, x) for x in a)
 

@@ -5,6 +5,8 @@ Software Manual for the Elementary Functions, 1980), then the minimax polynomial
 library. Absolute error below 3e-16 in float64 up to 1e6 rad, 2e-7 in float32 up to 1e4 rad.
 """
 
+from typing import Any
+
 import jax
 from jax import lax
 
@@ -38,7 +40,7 @@ _COS = {
 }
 
 
-def horner(coefficients: tuple[float, ...], x: jax.Array) -> jax.Array:
+def horner(coefficients: tuple[float, ...], x: Any) -> Any:
     """Return the polynomial with two `coefficients` or more, lowest degree first, at `x`."""
     result = coefficients[-1]
     for c in coefficients[-2::-1]:

@@ -13,6 +13,8 @@ needs one positive definite matrix of the size of d: a primal-dual interior poin
 corrector (S. Mehrotra, SIAM J. Optim. 2, 575-601, 1992).
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import jax

@@ -4,6 +4,8 @@ A small change of the net rotation R is written `dR = hat(turn) R`: `turn` is a 
 the start (inertial, if it starts aligned). `frame="end"` gives `R^T turn`, in the base's frame at the end.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Literal, NamedTuple

@@ -5,6 +5,8 @@ every move has a part up and a part down, both at least 0, so that travel is lin
 rest is a bound; cost keeps one of the two parts at 0.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -1,5 +1,7 @@
 """A design problem: named variables, what they make of robot and loop, what is wanted, and what must hold."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property

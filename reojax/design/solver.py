@@ -1,5 +1,7 @@
 """Constrained minimisation from many starts at once, or of many problems at once."""
 
+from __future__ import annotations
+
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial

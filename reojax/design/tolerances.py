@@ -1,5 +1,7 @@
 """Errors of a robot's numbers: where they come from, and the robot that has them."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from typing import NamedTuple
 

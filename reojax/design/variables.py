@@ -1,5 +1,7 @@
 """What a design problem may change: named numbers with bounds and units."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 

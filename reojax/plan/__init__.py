@@ -1,5 +1,7 @@
 """Any orientation: sequences of manoeuvres within the joint limits that end on a target (thesis 2.9)."""
 
+from __future__ import annotations
+
 from collections import OrderedDict
 from typing import Any
 

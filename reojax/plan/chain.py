@@ -5,6 +5,8 @@ amplitudes and a count: the loop is run so many times over, `M^n`. With quaterni
 so a word of hundreds of equal loops costs what one loop costs.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -5,6 +5,8 @@ them before the polygon and unfold them after it, as they do for words. Joint tr
 on an edge; while searching it is rounded off, `|d|` of an edge becoming `sqrt(d^2 + r^2) - r`.
 """
 
+from __future__ import annotations
+
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Any, NamedTuple, TypeVar

@@ -6,6 +6,8 @@ few integration steps; what those miss of the true net rotation is added to the 
 until the true one is on it.
 """
 
+from __future__ import annotations
+
 from typing import Any, NamedTuple
 
 import jax

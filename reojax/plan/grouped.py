@@ -5,6 +5,8 @@ it into turns about the loops' axes (an Euler split about axes that are not quit
 of loops and as few as possible. Then the numbers are made whole, up or down, and the amplitudes solved for.
 """
 
+from __future__ import annotations
+
 from itertools import product as every
 from typing import NamedTuple
 

@@ -1,5 +1,7 @@
 """Where searches start: words with random amplitudes, found by the rotation that they make."""
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import jax

@@ -5,6 +5,8 @@ that is continuous over the box (1 where nothing bends), and read by cubic B-spl
 search; what it finds is then solved on the true rotations.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial

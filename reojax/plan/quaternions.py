@@ -1,5 +1,7 @@
 """Unit quaternions (w, x, y, z) of many rotations at once, in NumPy or JAX: the components are on the first axis."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,7 @@
 """What planning gives back."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -4,6 +4,8 @@ Both run on the table, on many rows at once, one program per number of slots. No
 solved says so by its residual.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple

@@ -7,6 +7,8 @@ and unfolds them after it: that turns the base as if every loop folded and unfol
 each other), and moves the joints less.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

@@ -8,6 +8,8 @@ across the axis and `S` the second moment of mass about the joint; a massless L 
 foot has exactly that mass there, at the foot's height on the axis and at its length from it.
 """
 
+from __future__ import annotations
+
 import numpy as np
 from jaxtyping import Float
 

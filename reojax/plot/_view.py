@@ -1,5 +1,7 @@
 """From where robots are looked at, in 3-D axes and in flat ones alike, and the light on them."""
 
+from __future__ import annotations
+
 from typing import Literal, NamedTuple
 
 import numpy as np

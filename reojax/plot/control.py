@@ -1,5 +1,7 @@
 """Joints under control, and the orientation that follows, beside what was planned."""
 
+from __future__ import annotations
+
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes

@@ -1,5 +1,7 @@
 """A robot on its way: rows of frames, and animations."""
 
+from __future__ import annotations
+
 import io
 import os
 from collections.abc import Sequence

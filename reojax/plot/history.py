@@ -1,5 +1,7 @@
 """Orientation and joint angles along a path."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Literal
 

@@ -1,5 +1,7 @@
 """Results over a grid of designs: contours, families of lines, and the robot itself at every point."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import Any
 

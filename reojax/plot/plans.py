@@ -1,5 +1,7 @@
 """A plan on its way: where the body's axes point, how far the target still is, and what the joints do."""
 
+from __future__ import annotations
+
 import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure

@@ -1,5 +1,7 @@
 """Robots in space: their links at a pose, about their centre of mass."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any

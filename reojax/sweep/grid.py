@@ -1,5 +1,7 @@
 """The designs of a sweep: a full grid of axes, or a list; any stretch of them from its numbers alone."""
 
+from __future__ import annotations
+
 import inspect
 from collections.abc import Callable, Mapping
 from math import prod
