@@ -28,7 +28,7 @@ def test_the_same_to_the_last_bit(tmp_path):
         free.bind(("127.0.0.1", 0))
         coordinator = f"127.0.0.1:{free.getsockname()[1]}"
     children = [
-        start(tmp_path / "devices", flags="--xla_force_host_platform_device_count=2", devices=2),
+        start(tmp_path / "devices", flags="--xla_force_host_platform_device_count=2"),
         start(tmp_path / "processes", coordinator=coordinator, process=0),
         start(tmp_path / "processes", coordinator=coordinator, process=1),
     ]
@@ -59,3 +59,22 @@ def test_chosen_devices():
         np.testing.assert_array_equal(found.results, [1.0])
     with pytest.raises(ValueError, match="twice"):
         reojax.sweep(lambda x: x, {"x": [1.0]}, devices=[device, device])
+
+
+def test_a_device_for_each_core():
+    """All of them are used unless one is the default, and no more than there are chunks."""
+    code = """
+import os, jax
+from reojax._session import one_device_per_core
+from reojax.sweep.devices import at_most, mesh_of
+one_device_per_core()
+everything = mesh_of(None)
+assert list(everything.devices) == jax.devices() and everything.size == len(os.sched_getaffinity(0))
+with jax.default_device(jax.devices()[-1]):
+    assert list(mesh_of(None).devices) == jax.devices()[-1:]
+assert at_most(everything, 1).size == at_most(everything, 0).size == 1
+assert at_most(everything, 1000).size == everything.size
+one_device_per_core()  # too late for a change, and no error
+"""
+    environment = {name: value for name, value in os.environ.items() if name != "XLA_FLAGS"}
+    subprocess.run([sys.executable, "-W", "error", "-c", code], check=True, env=environment)

@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--store", metavar="FOLDER", help="keep finished chunks here, and go on from them when run again")
     add("--shard", type=shard, metavar="I/N", help="only every N-th chunk from the I-th on, I from 0 to N-1")
     add("--chunk-size", type=positive, metavar="DESIGNS", help="designs in a chunk [by the size of the sweep]")
-    add("--devices", type=positive, metavar="K", help="use K devices of this host [1]")
+    add("--devices", type=positive, metavar="K", help="use K devices of this host [all; every core is one]")
     add("--coordinator", metavar="HOST:PORT", help="run as one of several processes, which meet here")
     add("--processes", type=positive, metavar="N", help="how many they are")
     add("--process-id", type=int, metavar="K", help="which one this is, from 0 to N-1; 0 runs on HOST")
@@ -48,6 +48,7 @@ def run(args: argparse.Namespace) -> None:
     from reojax.sweep.turns import turn_function
 
     _session.start()
+    _session.one_device_per_core()
     try:
         _check(args)
         if args.coordinator is not None:

@@ -11,16 +11,18 @@ Devices = int | Sequence[jax.Device] | None
 
 
 def mesh_of(devices: Devices) -> Mesh:
-    """Mesh of the chosen devices: the default one, the first so many of this host, or the ones given.
+    """Mesh of the chosen devices: all, the first so many of this host, or the ones given.
 
-    In a program of several processes (`jax.distributed`) None means all devices of all of them, and a number
-    so many of each process.
+    None means all devices of JAX's default platform, or the default device where one is set (`jax.default_device`). In
+    a program of several processes (`jax.distributed`) it means all devices of all of them, and a number so many of
+    each process.
 
     Raises:
         ValueError: if there are not so many devices, or something else is given.
     """
     if devices is None:
-        chosen = jax.devices() if jax.process_count() > 1 else [jax.numpy.zeros(()).device]
+        alone = jax.process_count() == 1 and jax.config.values["jax_default_device"] is not None
+        chosen = [jax.numpy.zeros(()).device] if alone else jax.devices()
     elif isinstance(devices, int | np.integer) and not isinstance(devices, bool):
         chosen = _first(int(devices))
     else:
@@ -32,10 +34,15 @@ def mesh_of(devices: Devices) -> Mesh:
     return Mesh(np.array(chosen), ("device",))
 
 
+def at_most(mesh: Mesh, number: int) -> Mesh:
+    """Leave out devices of one process beyond `number`, which would have nothing to do."""
+    return mesh if jax.process_count() > 1 else Mesh(mesh.devices[: max(1, number)], mesh.axis_names)
+
+
 def _first(number: int) -> list[Any]:
     local = jax.local_devices()
     if not 0 < number <= len(local):
-        hint = "" if local[0].platform != "cpu" else " (XLA_FLAGS=--xla_force_host_platform_device_count=N makes more)"
+        hint = "" if local[0].platform != "cpu" else " (`jax.config.update('jax_num_cpu_devices', N)` makes more)"
         raise ValueError(f"`devices` is {number}; this process has {len(local)} {local[0].platform} devices{hint}.")
     if jax.process_count() == 1:
         return local[:number]

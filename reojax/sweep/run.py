@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax.sweep.chunks import compiled, cut
-from reojax.sweep.devices import Devices, mesh_of
+from reojax.sweep.devices import Devices, at_most, mesh_of
 from reojax.sweep.engine import run
 from reojax.sweep.grid import Designs, check_axes, check_function
 from reojax.sweep.identity import identity
@@ -57,7 +57,9 @@ def sweep(
         axes: 1-D arrays by name, for the full grid in this order; or `zipped(...)`, for a list of designs.
         chunk_size: designs in a chunk; default by the size of the sweep.
         store: folder for finished chunks, made if missing.
-        devices: None for the default device, a number of this host's devices, or a list of devices.
+        devices: None for all of JAX's devices (or the one that `jax.default_device` sets), a number of this host's
+            devices, or a list of devices. A CPU is one device, in which XLA computes mostly in one thread, unless
+            `jax.config.update("jax_num_cpu_devices", N)` comes first.
         progress: whether to show progress on stderr.
         units: units of axes and results by name, for labels.
         shard: (i, n) to run only every n-th chunk, from the i-th on, `0 <= i < n`; needs a `store`.
@@ -99,6 +101,7 @@ def computed(
     platform = mesh.devices.flat[0].platform
     sizes = cut(designs.total, chunk_size, bytes_per_design(outputs.arrays), platform)
     mine = range(first, sizes.chunks, parts)
+    mesh = at_most(mesh, len(mine))
     if store is None:
         memory = Memory(outputs.arrays, sizes, "give a `store`")
         program = compiled(function, designs, sizes, mesh)
