@@ -15,7 +15,7 @@ from typing import Any
 import jax
 from systems._measure import CORES
 
-from reojax._session import hold_memory
+from reojax._session import hold_memory, one_device_per_core
 
 PACKAGES = (
     *("jax", "jaxlib", "numpy", "scipy", "pin", "mujoco", "mujoco-mjx", "casadi"),
@@ -52,8 +52,12 @@ def run(main: Callable[..., None], parser: argparse.ArgumentParser) -> None:
 
 
 def settings() -> None:
-    """Switch float64 on and the compilation cache off, and hold freed memory."""
+    """Switch float64 on and the compilation cache off, hold freed memory, and make each core a device.
+
+    All rows but the ones that say so use the first of these devices, which may use all threads.
+    """
     hold_memory()
+    one_device_per_core()
     jax.config.update("jax_enable_x64", True)
     jax.config.update("jax_enable_compilation_cache", False)
 

@@ -41,6 +41,7 @@ def rows(
     dtype: Any = np.float64,
     variables: Sequence[str] = Loops._fields,
     note: str = "",
+    place: Any = None,
 ) -> Iterator[Row]:
     """Rows of the value, and of value and gradient.
 
@@ -55,8 +56,9 @@ def rows(
         dtype: of the loops.
         variables: what the gradients are by.
         note: of the rows.
+        place: device or sharding of the loops.
     """
-    batch = jax.device_put(Loops(*(field.astype(dtype) for field in task.loops.first(loops))))
+    batch = jax.device_put(Loops(*(field.astype(dtype) for field in task.loops.first(loops))), place)
     value, value_compile = compiled(rotations, batch)
     gradient, gradient_compile = compiled(gradients, batch)
     timed = measure([lambda: value(batch), lambda: gradient(batch)], task.seconds)

@@ -1,11 +1,13 @@
-"""reojax, through its public functions under `jax.jit(jax.vmap(...))`."""
+"""reojax, through its public functions under `jax.jit(jax.vmap(...))`, and under `jax.shard_map` on several devices."""
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.sharding import Mesh, NamedSharding, PartitionSpec as P
 
 import reojax
 from reojax import Robot
@@ -23,6 +25,8 @@ def float64(task: Task) -> Iterator[Row]:
     for label, steps in _steps(task).items():
         yield from _four_variables(task, f"reojax float64, {label}", steps, np.float64)
         yield from _every_array(task, f"reojax float64, {label}", steps)
+        if CORES > 1 and len(task.loops.twist) % CORES == 0:
+            yield from _four_variables(task, f"reojax float64, {label}, a device per core", steps, np.float64, CORES)
 
 
 def float32(task: Task) -> Iterator[Row]:
@@ -42,15 +46,21 @@ def _steps(task: Task) -> dict[str, int]:
     return {f"{TOLERANCE:.0e} rad": fewest(error, TOLERANCE), "default": DEFAULT_STEPS}
 
 
-def _four_variables(task: Task, system: str, steps: int, dtype: type) -> Iterator[Row]:
+def _four_variables(task: Task, system: str, steps: int, dtype: type, devices: int = 1) -> Iterator[Row]:
+    mesh = Mesh(np.array(jax.devices()[:devices]), ("device",))
+    spread = partial(jax.shard_map, mesh=mesh, in_specs=P("device"), out_specs=P("device"), check_vma=False)
+    functions = _jax_rows.under_vmap(lambda loop: net_rotation(loop, steps))
+    value, gradient = map(spread, functions) if devices > 1 else functions
     yield from _jax_rows.rows(
         task,
         system,
-        *_jax_rows.under_vmap(lambda loop: net_rotation(loop, steps)),
+        value,
+        gradient,
         loops=len(task.loops.twist),
         steps=steps,
         evaluations=4 * len(NODES) * steps,
         dtype=dtype,
+        place=NamedSharding(mesh, P("device")),
     )
 
 

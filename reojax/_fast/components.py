@@ -111,7 +111,8 @@ def known_parameters(robot: Robot, pattern: Pattern) -> Known:
         for shape, bytes_ in zip(shapes, pattern, strict=True):
             marks = np.full(shape, _UNKNOWN) if bytes_ is None else np.frombuffer(bytes_, np.int8).reshape(shape)
             fields.append(np.where(marks == _UNKNOWN, rest.uniform(1, 2, shape), marks))
-        return np.concatenate([array.ravel() for array in _parameters(fields, robot.rotor_on, np)])
+        with np.errstate(invalid="ignore"):  # an axis of zeros
+            return np.concatenate([array.ravel() for array in _parameters(fields, robot.rotor_on, np)])
 
     with_some, with_others = flat(0), flat(1)
     return tuple(
