@@ -36,7 +36,7 @@ class Certificate(NamedTuple):
     """How well a net rotation is known. Levels are for float64, named robots, edges of 10 to 270 degrees."""
 
     momentum: Float[Array, ""]
-    """Largest angular momentum along the path, relative, as `momentum_residual` has it; about 1e-11.
+    """Largest angular momentum along the path, relative, as `momentum_residual` has it; some 1e-11, by rounding.
 
     It is the rounding of the differences: 1e-12 rad per edge, whatever the path's size."""
     orthogonality: Float[Array, ""]
