@@ -3,7 +3,7 @@
     python benchmarks/start_up.py           # half a minute; --quick: fewer pairs
 
 Fresh processes by turns; the first pair is not counted, so that bytecode is compiled and files are in the cache.
-Writes start_up.json. Expected: reojax takes 0.2 to 0.3 s more than jax alone; matplotlib and SciPy wait until they
+Writes start_up.json. Expected: reojax takes 0.1 to 0.2 s more than jax alone; matplotlib and SciPy wait until they
 are used. Where Python may not write bytecode (PYTHONDONTWRITEBYTECODE) and has none, compiling it takes as long again.
 """
 
