@@ -45,7 +45,7 @@ LAYERS = [
     ["plan.closed"],
     ["plan.free"],
     ["plan.loops"],
-    ["plan.chain", "plan.library"],
+    ["plan.chain", "plan.starts"],
     ["plan.search"],
     ["plan.attempts"],
     ["plan.grouped"],

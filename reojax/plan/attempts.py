@@ -9,9 +9,9 @@ import numpy as np
 
 from reojax.manoeuvres import Layout
 from reojax.plan.chain import Word
-from reojax.plan.library import Library, Starts
 from reojax.plan.loops import Table, fold_rotation, tabulate, true_rotations
 from reojax.plan.search import Found, refine, shorten, solve
+from reojax.plan.starts import Pool, Starts
 from reojax.plan.words import Box, last_twist
 from reojax.robot import Robot
 
@@ -36,7 +36,7 @@ class Scene(NamedTuple):
     layout: Layout
     box: Box
     table: Table
-    library: Library
+    pool: Pool
     fold: np.ndarray
     """(4,) rotation while the feet fold."""
 
@@ -63,7 +63,7 @@ class Rows(NamedTuple):
 def scene(robot: Robot, layout: Layout, box: Box) -> Scene:
     """Compute what all plans of a robot within a box share."""
     table = jax.tree.map(jax.numpy.asarray, tabulate(robot, layout, box))
-    return Scene(robot, layout, box, table, Library(table, box), fold_rotation(robot, layout))
+    return Scene(robot, layout, box, table, Pool(table, box), fold_rotation(robot, layout))
 
 
 def price(box: Box, letter: np.ndarray, count: np.ndarray) -> np.ndarray:

@@ -52,7 +52,7 @@ class Polygons(NamedTuple):
     """Rotation vector (3,) from the target, by `COARSE` steps."""
 
 
-class Library(NamedTuple):
+class Pool(NamedTuple):
     """Random polygons within one box: the first half of any kind, the others words of rectangles."""
 
     low: Float[np.ndarray, " n"]
@@ -71,16 +71,16 @@ class Library(NamedTuple):
 
 
 _polygons: OrderedDict[Hashable, Polygons] = OrderedDict()
-_libraries: OrderedDict[Hashable, Library] = OrderedDict()
+_pools: OrderedDict[Hashable, Pool] = OrderedDict()
 
 
-def family_of(robot: Robot, layout: Layout, box: Box, corners: int, seed: int) -> tuple[Polygons, Library]:
+def family_of(robot: Robot, layout: Layout, box: Box, corners: int, seed: int) -> tuple[Polygons, Pool]:
     """Polygons with `corners` free corners and random ones within the box; the last few are kept, with programs."""
     low, high = box.low[0], box.high[0]
     key = key_of(robot), jax.dtypes.canonicalize_dtype(float), layout, corners
     polygons = _kept(_polygons, key, lambda: _polygons_of(robot, layout, corners))
     key = *key, low.tobytes(), high.tobytes(), seed
-    return polygons, _kept(_libraries, key, lambda: _library(polygons, low, high, corners, seed))
+    return polygons, _kept(_pools, key, lambda: _pool(polygons, low, high, corners, seed))
 
 
 def _kept(store: OrderedDict[Hashable, _Kept], key: Hashable, make: Callable[[], _Kept]) -> _Kept:
@@ -126,14 +126,14 @@ def _polygons_of(robot: Robot, layout: Layout, corners: int) -> Polygons:
     return Polygons(paths, rotations, travel, miss)
 
 
-def _library(polygons: Polygons, low: np.ndarray, high: np.ndarray, corners: int, seed: int) -> Library:
+def _pool(polygons: Polygons, low: np.ndarray, high: np.ndarray, corners: int, seed: int) -> Pool:
     rng = np.random.default_rng(seed)
     kinds = np.concatenate([_anyhow(rng, low, high, corners), _words(rng, low, high, corners)])
     size = np.where(rng.random(len(kinds)) < 0.5, 1.0, 10.0 ** rng.uniform(-3, 0, len(kinds)))
     x = (kinds * size[:, None, None]).reshape(len(kinds), -1)
     lengths = np.abs(np.diff(polygons.paths(x), axis=1)).sum((1, 2))
     turns = quaternions.from_matrices(polygons.rotations(x))
-    return Library(np.tile(low, corners), np.tile(high, corners), x, turns, lengths)
+    return Pool(np.tile(low, corners), np.tile(high, corners), x, turns, lengths)
 
 
 def _anyhow(rng: np.random.Generator, low: np.ndarray, high: np.ndarray, corners: int) -> np.ndarray:

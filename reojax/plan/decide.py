@@ -12,7 +12,7 @@ import numpy as np
 from reojax.plan import quaternions
 from reojax.plan.attempts import SIZES, Rows, Scene, attempt, least, settle, shortened, starting_rows, travel
 from reojax.plan.grouped import grouped_rows, loops
-from reojax.plan.library import FIRST, Starts
+from reojax.plan.starts import FIRST, Starts
 
 LONGEST = 5
 """Longest word whose loops each have amplitudes of their own; longer words repeat loops."""
@@ -93,12 +93,12 @@ def _with_loops(
 ) -> None:
     """Try words of `slots` loops for what is not reached yet."""
     waiting = np.flatnonzero(~answer.solved)
-    waiting = waiting[scene.library.reaches(targets[:, waiting], slots, _FAR.get(slots, _FAR_LONG))]
+    waiting = waiting[scene.pool.reaches(targets[:, waiting], slots, _FAR.get(slots, _FAR_LONG))]
     closest = np.zeros(len(waiting))
     close = _CLOSE_FEW.get(slots, _CLOSE)
     for first, last in rounds:
         trying = np.flatnonzero(~answer.solved[waiting] & (closest < _HOPE))
-        starts = scene.library.near(targets[:, waiting[trying]], slots, last)
+        starts = scene.pool.near(targets[:, waiting[trying]], slots, last)
         some = Starts(*(field[..., first:last] for field in starts))
         found = attempt(scene, targets, starting_rows(waiting[trying], some))
         if slots in _CLOSE_FEW:
@@ -112,7 +112,7 @@ def _with_loops(
 def _as_near_as_possible(scene: Scene, targets: np.ndarray, answer: Answer, slots: int) -> None:
     """Bring words of `slots` loops near the targets that are not reached, however far away they are."""
     waiting = np.flatnonzero(~answer.solved)
-    starts = scene.library.near(targets[:, waiting], slots, FIRST)
+    starts = scene.pool.near(targets[:, waiting], slots, FIRST)
     found = attempt(scene, targets, starting_rows(waiting, starts))
     answer.offer(least(found, found.square))
 
@@ -132,7 +132,7 @@ def cheapest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> 
     answer = fewest(scene, targets, min(most, LONGEST), tolerance)
     waiting = np.flatnonzero((answer.travel > 0) | ~answer.solved)
     for slots in range(1, min(most, LONGEST) + 1):
-        starts = scene.library.near(targets[:, waiting], slots, _ROUNDS[-1][1])
+        starts = scene.pool.near(targets[:, waiting], slots, _ROUNDS[-1][1])
         rows = starting_rows(waiting, starts)
         value = travel(scene.box, rows) + 20 * starts.distance.ravel()
         found = attempt(scene, targets, least(rows, value, _LEAST_TRAVEL))

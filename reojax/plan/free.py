@@ -19,7 +19,7 @@ from reojax._arrays import Array
 from reojax.design.solver import optimise
 from reojax.manoeuvres import Layout
 from reojax.plan import checks, quaternions
-from reojax.plan.closed import Library, Polygons, family_of
+from reojax.plan.closed import Polygons, Pool, family_of
 from reojax.plan.words import box_of
 from reojax.robot import Robot
 
@@ -113,11 +113,11 @@ def free_paths(
     corners, starts = checks.whole("corners", corners, 2), checks.whole("starts", starts)
     tolerance, max_steps = checks.positive("tolerance", tolerance), checks.whole("max_steps", max_steps)
     box = box_of(robot, layout, "R", twist_limit, bend_limit)
-    polygons, library = family_of(robot, layout, box, corners, checks.whole("seed", seed, 0))
+    polygons, pool = family_of(robot, layout, box, corners, checks.whole("seed", seed, 0))
     wanted = quaternions.to_matrices(quaternions.from_matrices(given))
     exact = _EXACT[jax.dtypes.canonicalize_dtype(float).itemsize]
     with _bar(progress) as bar:
-        solver = _Solver(polygons, library, min(_ROWS, len(wanted) * starts), exact, bar)
+        solver = _Solver(polygons, pool, min(_ROWS, len(wanted) * starts), exact, bar)
         x = _shortest(solver, _first(solver, wanted, starts, max_steps), wanted, max_steps, tolerance)
     paths, rotation = polygons.paths(x), polygons.rotations(x)
     still = _apart(np.eye(3), wanted) <= tolerance
@@ -130,7 +130,7 @@ class _Solver(NamedTuple):
     """What all solutions of one call share."""
 
     polygons: Polygons
-    library: Library
+    pool: Pool
     rows: int
     exact: float
     bar: Any
@@ -146,8 +146,8 @@ class _Solver(NamedTuple):
             found = optimise(
                 self.polygons.travel,
                 x[take],
-                lower=self.library.low,
-                upper=self.library.high,
+                lower=self.pool.low,
+                upper=self.pool.high,
                 equality=self.polygons.miss,
                 data=(targets[take], np.full(self.rows, rounding)),
                 tolerance=self.exact,
@@ -163,7 +163,7 @@ class _Solver(NamedTuple):
 
 def _first(solver: _Solver, targets: np.ndarray, starts: int, max_steps: int) -> np.ndarray:
     """Polygons (m, f, n) for each target: of those from so many starts the ones of least travel, or the closest."""
-    tried = np.array([solver.library.near(target, _ROUNDS * starts) for target in targets])
+    tried = np.array([solver.pool.near(target, _ROUNDS * starts) for target in targets])
     worth = np.full(tried.shape[:2], np.inf)
     for first in range(0, tried.shape[1], starts):
         waiting = np.flatnonzero(worth.min(1) >= _OFF)

@@ -36,7 +36,7 @@ class Starts(NamedTuple):
     """Chord between the quaternions of start and target: half the angle between them, if small."""
 
 
-class Library:
+class Pool:
     """Random words of a table's loops by length, made when first asked for; seeded, so always the same."""
 
     def __init__(self, table: Table, box: Box):
