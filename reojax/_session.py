@@ -48,16 +48,20 @@ def hold_memory() -> None:
             mallopt(_M_MMAP_THRESHOLD, 2**25)  # the most it takes
 
 
+def usable_cores() -> int:
+    """Count the cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def one_device_per_core() -> None:
     """Make every core that this process may use a device of JAX, for sweeps: XLA runs a program mostly in one thread.
 
     Nothing happens where devices have been set already (`JAX_NUM_CPU_DEVICES`, `XLA_FLAGS`) or are in use.
     """
-    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     chosen = "xla_force_host_platform_device_count" in os.environ.get("XLA_FLAGS", "")
     if not chosen and jax.config.values["jax_num_cpu_devices"] < 1:
         with suppress(RuntimeError):  # JAX has started
-            jax.config.update("jax_num_cpu_devices", count)
+            jax.config.update("jax_num_cpu_devices", usable_cores())
 
 
 def compile_quickly() -> None:

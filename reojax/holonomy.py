@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from reojax._arrays import Array, common_float
-from reojax._fast.components import Pattern, known_parameters, parameters, pattern_of
+from reojax._fast.components import Pattern, pattern_of
 from reojax._fast.endpoint import end_rotation, steps_of_path
 from reojax._fast.product import products_up_to, to_matrix
 from reojax.path import Path
@@ -83,7 +83,7 @@ def _net_rotation(robot: Robot, waypoints: Array, steps: int, pattern: Pattern) 
     robot, points = _as_arrays(robot, waypoints)
     if points.shape[0] == 1 or not robot.joints:
         return jnp.eye(3, dtype=points.dtype)
-    return end_rotation(parameters(robot), known_parameters(robot, pattern), robot.parent, points, steps)
+    return end_rotation(robot, pattern, points, steps)
 
 
 @partial(jax.jit, static_argnums=(2, 3))
@@ -93,8 +93,7 @@ def _rotation_history(robot: Robot, waypoints: Array, samples: int, pattern: Pat
     if not robot.joints or not edges:
         return jnp.tile(jnp.eye(3, dtype=points.dtype), (edges * samples + 1, 1, 1))
     finer = -(-DEFAULT_STEPS // samples)
-    known = known_parameters(robot, pattern)
-    step = steps_of_path(parameters(robot), known, robot.parent, points, samples * finer)
+    step = steps_of_path(robot, pattern, points, samples * finer)
     ends = tuple(q[finer - 1 :: finer] for q in products_up_to(step.rotation))
     return jnp.concatenate([jnp.eye(3, dtype=points.dtype)[None], jax.vmap(to_matrix)(ends)])
 

@@ -1,6 +1,5 @@
 """Clocks: wall time and the processor time of all threads, several calls by turns, so that ratios are of one moment."""
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -8,9 +7,11 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from reojax._session import usable_cores
+
 SAMPLE = 0.03
 """Least length of one sample [s]; short calls are repeated within it."""
-CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+CORES = usable_cores()
 """Cores that this process may use."""
 
 

@@ -21,10 +21,20 @@ import jax.numpy as jnp
 from jax.custom_derivatives import SymbolicZero
 
 from reojax._fast.blocks import Call, in_blocks
-from reojax._fast.components import Components, Known, Parameters, components, flattened, split
+from reojax._fast.components import (
+    Components,
+    Known,
+    Parameters,
+    Pattern,
+    components,
+    flattened,
+    known_parameters,
+    parameters,
+    split,
+)
 from reojax._fast.momentum import angular_momentum
 from reojax._fast.nodes import NODES, path_nodes, sum_over_nodes, to_nodes, to_points
-from reojax._fast.omega import inward, solve
+from reojax._fast.omega import AT_ONCE, inward, solve
 from reojax._fast.product import (
     Quaternion,
     Triple,
@@ -41,6 +51,7 @@ from reojax._fast.sincos import sincos
 from reojax._fast.steps import Step, mean_over_step, step_rotations
 from reojax._fast.store import keep
 from reojax._fast.virtual import slopes, together
+from reojax.robot import Robot
 
 
 class Problem(NamedTuple):
@@ -59,33 +70,33 @@ class Problem(NamedTuple):
         return components([x if k is None else k for x, k in zip(data, self.known, strict=True)], self.parent)
 
 
-def steps_of_path(parameters: Parameters, known: Known, parent: tuple[int, ...], points: jax.Array, steps: int) -> Step:
+def steps_of_path(robot: Robot, pattern: Pattern, points: jax.Array, steps: int) -> Step:
     """Rotation over each of the `steps` steps of each edge, in order."""
-    return _steps_of_path(Problem(steps, parent, known), flattened(parameters), points)
+    problem = Problem(steps, robot.parent, known_parameters(robot, pattern))
+    return _steps_of_path(problem, flattened(parameters(robot)), points)
 
 
-def end_rotation(
-    parameters: Parameters, known: Known, parent: tuple[int, ...], points: jax.Array, steps: int
-) -> jax.Array:
+def end_rotation(robot: Robot, pattern: Pattern, points: jax.Array, steps: int) -> jax.Array:
     """Rotation (3, 3) after the polygon `points` (v, j), v >= 2; all arrays of one dtype."""
-    return _end_rotation(Problem(steps, parent, known), parameters, points)
+    problem = Problem(steps, robot.parent, known_parameters(robot, pattern))
+    return _end_rotation(problem, parameters(robot), points)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _end_rotation(problem: Problem, parameters: Parameters, points: jax.Array) -> jax.Array:
-    alive = 1 if points.shape[1] <= 4 else 4
+def _end_rotation(problem: Problem, numbers: Parameters, points: jax.Array) -> jax.Array:
+    alive = 1 if points.shape[1] <= AT_ONCE else 4
     call = Call(_rotation, problem, ((3, 3),), alive * _nodes(problem, points))
-    return in_blocks(call, flattened(parameters), points)[0]
+    return in_blocks(call, flattened(numbers), points)[0]
 
 
 @partial(_end_rotation.defjvp, symbolic_zeros=True)
 def _end_rotation_jvp(problem, primals, tangents):
     rotation = _end_rotation(problem, *primals)
-    parameters, points = primals
-    by_parameters, by_points = tangents
-    varied = [change for change in by_parameters if not isinstance(change, SymbolicZero)]
+    numbers, points = primals
+    by_numbers, by_points = tangents
+    varied = [change for change in by_numbers if not isinstance(change, SymbolicZero)]
     problem = problem._replace(
-        varied=tuple(not isinstance(c, SymbolicZero) for c in by_parameters for _ in range(c.size)),
+        varied=tuple(not isinstance(c, SymbolicZero) for c in by_numbers for _ in range(c.size)),
         moved=not isinstance(by_points, SymbolicZero),
     )
     changes = ([flattened(varied)] if varied else []) + [by_points] * problem.moved
@@ -93,7 +104,7 @@ def _end_rotation_jvp(problem, primals, tangents):
         return rotation, jnp.zeros_like(rotation)
     alive = max(4, points.shape[1])
     call = Call(_push, problem, ((3,),), alive * _nodes(problem, points), transpose=_pull, linear=len(changes))
-    turn = in_blocks(call, flattened(parameters), points, *changes)[0]
+    turn = in_blocks(call, flattened(numbers), points, *changes)[0]
     return rotation, jnp.cross(turn[:, None], rotation, axis=0)
 
 

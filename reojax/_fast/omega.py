@@ -37,7 +37,7 @@ from reojax._fast.scalar import (
 from reojax._fast.sincos import sincos
 from reojax._fast.store import keep
 
-_AT_ONCE = 4
+AT_ONCE = 4
 """So many joints are computed in one loop; more values than they read would not be vectorised."""
 
 
@@ -69,8 +69,8 @@ def inward(
     `by_joint`: without, XLA computes long chains again for every value they end in, and compile time grows with their
     square or worse.
     """
-    long = len(robot.parent) > _AT_ONCE
-    every = 1 if by_joint or (long and not robot.axes_known) else _AT_ONCE
+    long = len(robot.parent) > AT_ONCE
+    every = 1 if by_joint or (long and not robot.axes_known) else AT_ONCE
     m = list(robot.mass)
     f, J = list(robot.moment), list(robot.inertia)
     p, h = [ZERO] * len(m), [ZERO] * len(m)
