@@ -15,7 +15,7 @@ from typing import Any
 import jax
 from systems._measure import CORES
 
-from reojax._session import hold_memory, one_device_per_core
+from reojax.session import hold_memory, one_device_per_core
 
 PACKAGES = (
     *("jax", "jaxlib", "numpy", "scipy", "pin", "mujoco", "mujoco-mjx", "casadi"),

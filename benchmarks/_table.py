@@ -7,7 +7,7 @@ from typing import Any
 from systems._rows import GRADIENT, Row
 from systems._task import REFERENCE_STEPS, TOLERANCE, Task
 
-from reojax._output import replacing
+from reojax.files import replacing
 
 START, END = "<!-- table -->", "<!-- /table -->"
 HEADINGS = (

@@ -5,7 +5,7 @@
 Writes devices.json. The first device of every platform that JAX sees, batches of 1e3 to 1e6 loops, value and gradients,
 both dtypes, default steps; times are wall times. Expected: the same results to the last few digits on all devices; on a
 GPU, loops that cost less the more there are, until it is full; memory in proportion to the batch there, so that larger
-batches go in parts (`reojax.sweep` does that).
+batches go in parts (`reojax.sweeps` does that).
 """
 
 from collections.abc import Callable, Iterator
@@ -21,8 +21,8 @@ from systems._measure import compiled, measure
 from systems._task import Loops, Reference, Task, net_rotation, objective, path_of, random_loops, robot_of
 
 import reojax
-from reojax._output import check_writable, write_json
-from reojax.holonomy import DEFAULT_STEPS
+from reojax.files import check_writable, write_json
+from reojax.mechanics.holonomy import DEFAULT_STEPS
 
 VALUE, GRADIENT, ALL = "value", "with gradient, 4 variables", "with gradient, every array"
 SIZES = {VALUE: (10**3, 10**4, 10**5, 10**6), GRADIENT: (10**3, 10**4, 10**5), ALL: (10**3, 10**4)}

@@ -1,7 +1,7 @@
 /* Net rotation of a serial four-link robot after manoeuvre A, written by hand for SIMD: eight designs side by side.
 
    What reojax is measured against. Fourth-order Magnus method, two Gauss nodes a step, base frame; momenta are gathered
-   from the tip to the base as in reojax/_fast/omega.py. From node to node the sines and cosines move by angle addition.
+   from the tip to the base as in reojax.mechanics._fast/omega.py. From node to node the sines and cosines move by angle addition.
    Two forms: `net_rotation` for any axes and anchors, given as data, and `net_rotation_prototype` with the structure of
    one robot put in by hand: twist joints about -z, bend joint about x, anchors on z. */
 

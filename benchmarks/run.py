@@ -18,7 +18,7 @@ from systems._task import REFERENCE_STEPS, TOLERANCE, Reference, Task, random_lo
 from systems.ode import independent_check
 from tqdm import tqdm
 
-from reojax._output import check_writable, write_json
+from reojax.files import check_writable, write_json
 
 README = Path(__file__).with_name("README.md")
 LOOPS = 1024

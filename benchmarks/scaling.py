@@ -18,7 +18,6 @@ from _command import machine, options, run, say
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
-from systems._foreign import from_tests
 from systems._magnus import GAUSS, plain_error
 from systems._measure import compiled, measure, timed
 from systems._task import Loops, Reference, net_rotation, objective, random_loops
@@ -26,9 +25,10 @@ from tqdm import tqdm
 
 import reojax
 from reojax import robots
-from reojax._fast.nodes import NODES
-from reojax._output import check_writable, replacing, write_json
-from reojax.holonomy import DEFAULT_STEPS
+from reojax.files import check_writable, replacing, write_json
+from reojax.mechanics._fast.nodes import NODES
+from reojax.mechanics.holonomy import DEFAULT_STEPS
+from reojax.robots.random import random_robot
 
 BATCH = 1000
 JOINTS = (2, 4, 8, 16)
@@ -125,7 +125,7 @@ def _joints(quick: bool, seconds: float, missing: dict[str, str]) -> Iterator[Po
 
 
 def _of_joints(joints: int, series: str, seconds: float) -> Iterator[Point]:
-    robot = from_tests("random_robots").random_robot(7, joints)
+    robot = random_robot(7, joints)
     points = np.random.default_rng(7).uniform(-1.5, 1.5, (256, 5, joints))
     points[:, -1] = points[:, 0]
 

@@ -16,7 +16,7 @@ from statistics import median
 from _command import machine, options, run
 
 import reojax
-from reojax._output import check_writable, write_json
+from reojax.files import check_writable, write_json
 
 MODULES = ("jax", "reojax")
 LATER = ("matplotlib", "scipy", "optax", "tqdm.auto")

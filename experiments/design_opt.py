@@ -19,14 +19,14 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from _design import gradient_error, least_travel, summary, table
-from _script import options, run
+from common.script import options, run
+from common.tables import gradient_error, least_travel, summary, table
 from matplotlib.figure import Figure
 
 import reojax
 from reojax import design, plot
-from reojax._output import check_writable, write_json
 from reojax.design import Solution
+from reojax.files import check_writable, write_json
 from reojax.robots import prototype, with_end_inertia, with_gear_ratio
 
 LOWER, UPPER = np.array([10.0, 1.0]), np.array([190.0, 48.0])

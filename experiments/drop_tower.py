@@ -16,17 +16,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import _drop_tower_capture
-import _drop_tower_release
-import _drop_tower_time
-import _drop_tower_tracking
 import numpy as np
-from _script import options, run
+from common.script import options, run
+from drop_tower_parts import (
+    capture as capture_part,
+    release as release_part,
+    time as time_part,
+    tracking as tracking_part,
+)
 
 import reojax
 from reojax import robots
-from reojax._orientation import tilt_and_roll
-from reojax._output import check_writable, write_json
+from reojax.files import check_writable, write_json
+from reojax.mechanics.attitude import tilt_and_roll
 
 HEIGHT, GRAVITY = 2.0, 9.80665  # m, m/s^2; thesis 1.8
 DELAY = 0.02  # s from the release to the start of the motion, thesis 1.8
@@ -36,7 +38,7 @@ CAMERA, CAPTURE = 800.0, 300.0  # frames per second, thesis 1.8
 def the_fall() -> dict[str, Any]:
     """How long there is, how many frames it makes, and whether the planned motion fits."""
     fall = float(np.sqrt(2 * HEIGHT / GRAVITY))
-    planned = float(np.sum(_drop_tower_tracking.DURATIONS))
+    planned = float(np.sum(tracking_part.DURATIONS))
     over = planned - (fall - DELAY)
     verdict = f"{planned:.3f}, " + (f"{1e3 * over:.1f} ms too long" if over > 0 else "fits")
     rows = [
@@ -52,7 +54,7 @@ def the_fall() -> dict[str, Any]:
 def the_plan() -> dict[str, Any]:
     """Net rotations of A and B at 270/120."""
     robot, rows, result = robots.prototype(), [], {}
-    for name, plan in _drop_tower_tracking.plans().items():
+    for name, plan in tracking_part.plans().items():
         turns = np.asarray(reojax.released(robot, plan, steps=64).rotation)
         roll = float(tilt_and_roll(turns)[-1, 2])
         vector = np.asarray(reojax.so3.log(turns[-1]))
@@ -69,10 +71,10 @@ def main(out: Path, *, quick: bool = False) -> dict[str, Any]:
     parts: dict[str, Callable[[], dict[str, Any]]] = {
         "fall": the_fall,
         "plan": the_plan,
-        "time": lambda: _drop_tower_time.section(out, quick=quick),
-        "tracking": lambda: _drop_tower_tracking.section(out, quick=quick),
-        "release": lambda: _drop_tower_release.section(quick=quick),
-        "capture": lambda: _drop_tower_capture.section(out, quick=quick),
+        "time": lambda: time_part.section(out, quick=quick),
+        "tracking": lambda: tracking_part.section(out, quick=quick),
+        "release": lambda: release_part.section(quick=quick),
+        "capture": lambda: capture_part.section(out, quick=quick),
     }
     sections: dict[str, Any] = {}
     for name, part in parts.items():

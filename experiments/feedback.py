@@ -20,14 +20,14 @@ Expected: one reading alone is off by 2.8 degrees (95th percentile); learning sh
 from pathlib import Path
 
 import numpy as np
-from _correcting import LIMITS, LINKS, NOMINAL, SPREAD, Words, along, angle_left, correct, estimate, turns
-from _script import options, run
+from common.script import options, run
+from feedback_parts.correcting import LIMITS, LINKS, NOMINAL, SPREAD, Words, along, angle_left, correct, estimate, turns
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 from tqdm import tqdm
 
 import reojax
-from reojax._output import check_writable, write_json
+from reojax.files import check_writable, write_json
 
 CORRECTIONS = 3
 EVERY = "every manoeuvre"

@@ -17,15 +17,15 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from _script import options, run
+from common.script import options, run
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 import reojax
 from reojax import robots, so3
-from reojax._output import check_writable, write_json
-from reojax.momentum import kinematics
+from reojax.files import check_writable, write_json
+from reojax.mechanics.kinematics import kinematics
 from reojax.robots.prototype import END_INERTIA, GEAR_RATIO, ROTOR_INERTIA, TOTAL_MASS, Chosen
 
 FITTED = ("middle_length", "middle_radius", "foot_angle")

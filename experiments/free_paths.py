@@ -13,15 +13,15 @@ import time
 from pathlib import Path
 
 import numpy as np
-from _replay import apart, replay
-from _script import options, run
+from common.replay import apart, replay
+from common.script import options, run
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 from tqdm import tqdm
 
 import reojax
 from reojax import robots
-from reojax._output import check_writable, write_json
+from reojax.files import check_writable, write_json
 
 LIMITS = {"twist_limit": np.deg2rad(270), "bend_limit": np.deg2rad(120)}
 ROBOT = robots.prototype()

@@ -13,14 +13,14 @@ from pathlib import Path
 
 import jax
 import numpy as np
-from _design import least_travel, summary, table
-from _script import options, run
+from common.script import options, run
+from common.tables import least_travel, summary, table
+from common.types import Array
 from matplotlib.figure import Figure
 
 import reojax
 from reojax import design, plot, so3
-from reojax._arrays import Array
-from reojax._output import check_writable, write_json
+from reojax.files import check_writable, write_json
 from reojax.robots import prototype
 
 TARGET = np.array([np.pi / 2, 0, 0])

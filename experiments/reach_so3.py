@@ -18,14 +18,14 @@ from itertools import groupby
 from pathlib import Path
 
 import numpy as np
-from _replay import apart, pinocchio, replay
-from _script import options, run
+from common.replay import apart, pinocchio, replay
+from common.script import options, run
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 import reojax
 from reojax import robots
-from reojax._output import check_writable, write_json
+from reojax.files import check_writable, write_json
 
 LIMITS = {"twist_limit": np.deg2rad(270), "bend_limit": np.deg2rad(120), "max_manoeuvres": 5}
 SMALL = {"twist_limit": np.deg2rad(20), "bend_limit": np.deg2rad(20), "max_manoeuvres": 2000}

@@ -5,7 +5,7 @@
 Polygons with four free corners within 270/120. The plain optimum has least joint travel, the robust one least mean
 square turn of the result when the inertia of every link and of every rotor has an independent error of 5 %, with no
 more travel than the thesis's 270/120 loop (1320 degrees). Both hit the target exactly with the nominal robot. The
-spread of both is then computed by the linear rule and by sampling robots through `reojax.sweep`.
+spread of both is then computed by the linear rule and by sampling robots through `reojax.sweeps`.
 
 Expected: the robust loop's spread is smaller; the linear rule and the samples agree to a few per cent.
 """
@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from _design import TARGET, least_travel, replay, table
-from _script import options, run
+from common.script import options, run
+from common.tables import TARGET, least_travel, replay, table
 from matplotlib.figure import Figure
 
 import reojax
 from reojax import design, plot, so3
-from reojax._output import check_writable, write_json
 from reojax.design import Problem
+from reojax.files import check_writable, write_json
 from reojax.robots import prototype
 
 HALF_TURN = np.array([0.0, 0.0, np.pi])

@@ -15,15 +15,15 @@ Expected: 0 with one A or B, as their rotations are surfaces in SO(3); more with
 from pathlib import Path
 
 import numpy as np
-from _script import options, run
+from common.script import options, run
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 import reojax
 from reojax import robots
-from reojax._output import check_writable, write_json
-from reojax.plan import quaternions
-from reojax.plan.loops import true_rotations
+from reojax.files import check_writable, write_json
+from reojax.planning import quaternions
+from reojax.planning.table import true_rotations
 
 ROBOT = robots.prototype()
 LIMITS = {"twist_limit": np.deg2rad(270), "bend_limit": np.deg2rad(120)}

@@ -15,14 +15,14 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from _replay import replay
-from _script import options, run
+from common.replay import replay
+from common.script import options, run
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 import reojax
 from reojax import robots
-from reojax._output import check_writable, write_json
+from reojax.files import check_writable, write_json
 
 ROBOT = robots.prototype()
 TWIST, BEND = np.deg2rad([200.0, 90.0])

@@ -18,15 +18,15 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from _design import at_best, least_travel, table
-from _script import options, run
+from common.script import options, run
+from common.tables import at_best, least_travel, table
+from common.types import Array
 from tqdm import tqdm
 
 import reojax
 from reojax import design, so3
-from reojax._arrays import Array
-from reojax._output import check_writable, write_json
 from reojax.design import Loops, Problem
+from reojax.files import check_writable, write_json
 from reojax.robots import prototype
 
 TARGET = np.array([0.0, 0.0, np.pi])

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from _script import options, run
+from common.script import options, run
 from scipy.spatial.transform import Rotation, Slerp
 
 import reojax
 from reojax import robots
-from reojax._output import check_writable, replacing, write_json
+from reojax.files import check_writable, replacing, write_json
 
 SEED = 7
 RATE = 300.0  # Hz, thesis 1.8

@@ -16,16 +16,15 @@ base frame it is off by 46.
 
 from pathlib import Path
 
-import _thesis_claims as claims
-import _thesis_pictures as pictures
 import numpy as np
-from _script import options, run
-from _thesis_curvature import Errors, study
-from _thesis_grids import FULL_BEND, FULL_TWIST, Grid, sweeps
-from _thesis_measure import FULL_A, FULL_B, measure
+from common.script import options, run
+from thesis import claims as claims, pictures as pictures
+from thesis.curvature import Errors, study
+from thesis.grids import FULL_BEND, FULL_TWIST, Grid, sweeps
+from thesis.measure import FULL_A, FULL_B, measure
 
 from reojax import plot, robots
-from reojax._output import check_writable, replacing, write_json
+from reojax.files import check_writable, replacing, write_json
 
 PICTURES = ("1_9", "2_5", "2_6", "2_7", "2_8", "2_9", "2_10")
 CURVED = ("curvature_a", "curvature_b", "curvature_loops")

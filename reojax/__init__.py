@@ -1,65 +1,142 @@
 """reojax: how a robot in free fall turns itself with its own joints, differentiably, in JAX."""
 
-from reojax import design as design, robots as robots, so3 as so3
-from reojax.calibrate import Calibration as Calibration, calibrate as calibrate
-from reojax.capture import Capture as Capture, make_capture as make_capture, read_capture as read_capture
-from reojax.certificate import Certificate as Certificate, certify as certify
-from reojax.comparison import Comparison as Comparison, compare as compare, joints_simulated as joints_simulated
-from reojax.control import Gains as Gains, Tracking as Tracking, track as track
-from reojax.curvature import curvature as curvature
-from reojax.dynamics import (
-    base_velocity as base_velocity,
-    forward_dynamics as forward_dynamics,
-    inverse_dynamics as inverse_dynamics,
-    joint_inertia as joint_inertia,
-    kinetic_energy as kinetic_energy,
+from typing import TYPE_CHECKING, Any
+
+from reojax import design, robots, so3
+from reojax.captures.calibration import Calibration, calibrate
+from reojax.captures.capture import Capture, make_capture, read_capture
+from reojax.captures.comparison import Comparison, Sampled, compare, joints_simulated
+from reojax.captures.parameters import Parameter
+from reojax.files.trajectories import write_trajectory
+from reojax.manoeuvres import FOUR_BODY, SIX_BODY, Layout, layout_for, manoeuvre_a, manoeuvre_b
+from reojax.mechanics.certificate import Certificate, certify
+from reojax.mechanics.curvature import curvature
+from reojax.mechanics.dynamics import (
+    base_velocity,
+    forward_dynamics,
+    inverse_dynamics,
+    joint_inertia,
+    kinetic_energy,
 )
-from reojax.export import write_trajectory as write_trajectory
-from reojax.fastest import (
-    Fastest as Fastest,
-    fastest_loop as fastest_loop,
-    free_law as free_law,
-    overlap as overlap,
-)
-from reojax.holonomy import net_rotation as net_rotation, rotation_history as rotation_history
-from reojax.manoeuvres import (
-    FOUR_BODY as FOUR_BODY,
-    SIX_BODY as SIX_BODY,
-    Layout as Layout,
-    manoeuvre_a as manoeuvre_a,
-    manoeuvre_b as manoeuvre_b,
-)
-from reojax.minimum_time import LeastTime as LeastTime, minimum_time as minimum_time
-from reojax.momentum import (
-    angular_momentum as angular_momentum,
-    connection as connection,
-    momentum_matrices as momentum_matrices,
-)
-from reojax.motion import Motion as Motion, simulate as simulate
-from reojax.motor import RE_MAX_17 as RE_MAX_17, Motor as Motor, with_motors as with_motors
-from reojax.path import Path as Path, joint_travel as joint_travel, polygon as polygon
-from reojax.plan import (
-    FreePaths as FreePaths,
-    Plan as Plan,
-    free_path as free_path,
-    free_paths as free_paths,
-    plan as plan,
-    plan_many as plan_many,
-    replan as replan,
-)
-from reojax.release import (
-    Release as Release,
-    Released as Released,
-    ReleaseSpread as ReleaseSpread,
-    release_spread as release_spread,
-    released as released,
-)
-from reojax.robot import Robot as Robot, make_robot as make_robot
-from reojax.sweep import Sweep as Sweep, sweep as sweep, zipped as zipped
-from reojax.time_law import (
-    Law as Law,
-    minimum_jerk as minimum_jerk,
-    quintic as quintic,
-    trapezoid as trapezoid,
-)
-from reojax.trajectory import Trajectory as Trajectory, along as along, through as through
+from reojax.mechanics.holonomy import net_rotation, rotation_history
+from reojax.mechanics.momentum import MomentumMatrices, angular_momentum, connection, momentum_matrices
+from reojax.motion.fastest import Fastest, fastest_loop, free_law, overlap
+from reojax.motion.least_time import LeastTime, minimum_stretch, minimum_time
+from reojax.motion.motor import RE_MAX_17, Motor, no_load_speed, stall_torque, with_motors
+from reojax.motion.pid import Gains, Tracking, gains, track
+from reojax.motion.release import Release, Released, ReleaseSpread, release_spread, released
+from reojax.motion.simulation import Motion, simulate
+from reojax.motion.time_laws import Law, minimum_jerk, quintic, trapezoid
+from reojax.motion.trajectory import Trajectory, along, through
+from reojax.path import Path, joint_travel, polygon
+from reojax.planning.free_path import FreePaths, free_path, free_paths
+from reojax.planning.plan import plan, plan_many, replan
+from reojax.planning.result import Plan
+from reojax.robot import Robot, make_robot
+from reojax.sweeps.grid import zipped
+from reojax.sweeps.merge import merge
+from reojax.sweeps.result import BadDesign, Sweep
+from reojax.sweeps.sweep import sweep
+
+if TYPE_CHECKING:
+    from reojax import plot
+
+__all__ = [
+    "along",
+    "angular_momentum",
+    "BadDesign",
+    "base_velocity",
+    "calibrate",
+    "Calibration",
+    "Capture",
+    "Certificate",
+    "certify",
+    "compare",
+    "Comparison",
+    "connection",
+    "curvature",
+    "design",
+    "Fastest",
+    "fastest_loop",
+    "forward_dynamics",
+    "FOUR_BODY",
+    "free_law",
+    "free_path",
+    "free_paths",
+    "FreePaths",
+    "Gains",
+    "gains",
+    "inverse_dynamics",
+    "joint_inertia",
+    "joint_travel",
+    "joints_simulated",
+    "kinetic_energy",
+    "Law",
+    "Layout",
+    "layout_for",
+    "LeastTime",
+    "make_capture",
+    "make_robot",
+    "manoeuvre_a",
+    "manoeuvre_b",
+    "merge",
+    "minimum_jerk",
+    "minimum_stretch",
+    "minimum_time",
+    "momentum_matrices",
+    "MomentumMatrices",
+    "Motion",
+    "Motor",
+    "net_rotation",
+    "no_load_speed",
+    "overlap",
+    "Parameter",
+    "Path",
+    "Plan",
+    "plan",
+    "plan_many",
+    "plot",
+    "polygon",
+    "quintic",
+    "RE_MAX_17",
+    "read_capture",
+    "Release",
+    "release_spread",
+    "Released",
+    "released",
+    "ReleaseSpread",
+    "replan",
+    "Robot",
+    "robots",
+    "rotation_history",
+    "Sampled",
+    "simulate",
+    "SIX_BODY",
+    "so3",
+    "stall_torque",
+    "Sweep",
+    "sweep",
+    "through",
+    "track",
+    "Tracking",
+    "Trajectory",
+    "trapezoid",
+    "with_motors",
+    "write_trajectory",
+    "zipped",
+]
+
+_LAZY = ("plot",)
+"""Packages that are imported at their first use: what they need takes long to import."""
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        import importlib
+
+        return importlib.import_module(f"reojax.{name}")
+    raise AttributeError(f"module 'reojax' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reojax._arrays import Array, as_numbers, is_concrete
+from reojax._internal.arrays import Array, as_numbers, is_concrete
 from reojax.path import Path, polygon
 from reojax.robot import Robot
 

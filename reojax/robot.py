@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._arrays import Array
-from reojax._robot_checks import check_robot
+from reojax._internal.arrays import Array
+from reojax._internal.robot_checks import check_robot
 
 Side = Literal["parent", "child"]
 

@@ -23,7 +23,7 @@ from jax import lax
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._arrays import Array
+from reojax._internal.arrays import Array
 
 
 def hat(vector: ArrayLike) -> Float[Array, "3 3"]:

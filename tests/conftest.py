@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import jax
 import pytest
 
-from reojax._session import compile_quickly
+from reojax.session import compile_quickly
 
 compile_quickly()
 jax.config.update("jax_enable_x64", True)

@@ -1,79 +1,25 @@
 """Imports point one way, the package's import stays light, and it changes no global setting."""
 
 import ast
+import importlib
+import re
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).parent.parent / "reojax"
+import reojax
 
-LAYERS = [
-    ["_arrays", "_robot_checks", "_output", "_session", "_shown"],
-    ["_smallmat", "_orientation", "so3", "robot", "path"],
-    ["momentum", "manoeuvres"],
-    ["_fast.scalar", "_fast.store"],
-    ["_fast.sincos", "_fast.components", "_fast.nodes", "_fast.product", "_fast.blocks"],
-    ["_fast.omega", "_fast.steps"],
-    ["_fast.momentum"],
-    ["_fast.virtual"],
-    ["_fast.endpoint"],
-    ["holonomy", "curvature"],
-    ["robots._solids"],
-    ["robots.prototype", "robots.planar", "robots.two_cylinder_cat"],
-    ["robots.six_body"],
-    ["robots"],
-    ["certificate"],
-    ["sweep.grid", "sweep.devices"],
-    ["sweep.outputs", "sweep.chunks", "sweep.table"],
-    ["sweep.identity", "sweep.engine", "sweep.memory", "sweep.progress"],
-    ["sweep.store"],
-    ["sweep.merge", "sweep.resume"],
-    ["sweep.run", "sweep.turns"],
-    ["sweep"],
-    ["design._quadratic"],
-    ["design._steps"],
-    ["design.solver"],
-    ["design.descent", "design.variables", "design.edits", "design.tolerances"],
-    ["design.loops"],
-    ["design.smooth", "design.problem"],
-    ["design.measures"],
-    ["design.certainty"],
-    ["design"],
-    ["plan.quaternions", "plan.words", "plan.checks"],
-    ["plan.closed"],
-    ["plan.free"],
-    ["plan.loops"],
-    ["plan.chain", "plan.starts"],
-    ["plan.search"],
-    ["plan.attempts"],
-    ["plan.grouped"],
-    ["plan.decide", "plan.result"],
-    ["plan"],
-    ["_lie", "_spline", "dynamics"],
-    ["time_law", "motor"],
-    ["trajectory"],
-    ["motion"],
-    ["minimum_time", "_polish"],
-    ["_least_duration"],
-    ["fastest"],
-    ["_capture_columns", "_parameters"],
-    ["capture", "release", "export"],
-    ["comparison", "control"],
-    ["calibrate"],
-    ["plot._style", "plot.files", "plot._view", "plot._solids"],
-    ["plot.history", "plot.robots", "plot.capture", "plot.control", "plot.sweeps", "plot.motion"],
-    ["plot.frames", "plot.maps", "plot.plans"],
-    ["plot"],
-    ["cli._arguments"],
-    ["cli._axes", "cli._results", "cli._planned", "cli._manoeuvre", "cli._motors"],
-    ["cli._motion"],
-    ["cli.simulate", "cli.time", "cli.compare", "cli.export", "cli.sweep", "cli.merge", "cli.plan"],
-    ["cli"],
-    ["__init__", "__main__"],
-]
-RANK = {module: rank for rank, layer in enumerate(LAYERS) for module in layer}
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "reojax"
+
+ORDER = (
+    "_internal session so3 path robot sweeps manoeuvres mechanics collision robots models interop optimisation "
+    "motion design planning captures steering files plot viewer cli"
+).split()
+"""Packages and single modules, each of which imports only what stands before it."""
 
 
 def _name(file: Path) -> str:
@@ -85,26 +31,58 @@ MODULES = {_name(file): file for file in PACKAGE.rglob("*.py") if file.read_text
 
 
 def _imports(file: Path) -> set[str]:
+    """Modules of the package that a file reads when it is imported or when its functions run."""
     found = set()
     for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("reojax"):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.partition(".")[0] == "reojax":
             inside = node.module.removeprefix("reojax").lstrip(".")
-            submodules = {f"{inside}.{a.name}".lstrip(".") for a in node.names}
-            found |= (submodules & RANK.keys()) or {inside or "__init__"}
-    return found
+            submodules = {f"{inside}.{alias.name}".lstrip(".") for alias in node.names}
+            found |= (submodules & MODULES.keys()) or {inside}
+    return found - {""}
 
 
-@pytest.mark.parametrize("module", sorted(MODULES))
-def test_a_module_imports_only_what_stands_before_it(module):
-    """Each module has a place in the order, and reads only from lower ones."""
-    assert module in RANK, f"give {module} a place in LAYERS"
-    assert not {name for name in _imports(MODULES[module]) if RANK[name] >= RANK[module]}
+def _room(module: str) -> str:
+    return module.partition(".")[0]
+
+
+@pytest.mark.parametrize("module", sorted(MODULES.keys() - {"__init__", "__main__"}))
+def test_packages_import_one_way(module):
+    """Each package has a place in the order, and reads only from those before it and from itself."""
+    assert _room(module) in ORDER, f"give {_room(module)} a place in ORDER"
+    later = {name for name in _imports(MODULES[module]) if ORDER.index(_room(name)) > ORDER.index(_room(module))}
+    assert not later
+
+
+def test_no_circles_inside_a_package():
+    """Modules can be put in an order in which each imports only earlier ones."""
+    TopologicalSorter({name: _imports(file) - {name} for name, file in MODULES.items()}).prepare()
+
+
+def test_few_files_lie_beside_the_packages():
+    assert len([file for file in PACKAGE.glob("*.py")]) <= 8
+
+
+def test_no_function_hides_a_package():
+    """`reojax.sweeps.merge`, and not an AttributeError of a function `sweep`."""
+    for folder in (f for f in PACKAGE.iterdir() if (f / "__init__.py").exists() and not f.name.startswith("_")):
+        module = importlib.import_module(f"reojax.{folder.name}")
+        assert getattr(reojax, folder.name) is module
+
+
+def test_the_public_list_is_complete():
+    assert all(hasattr(reojax, name) for name in reojax.__all__)
+    assert len(set(reojax.__all__)) == len(reojax.__all__)
+
+
+@pytest.mark.parametrize("file", [*(ROOT / "experiments").rglob("*.py")], ids=lambda file: file.name)
+def test_experiments_use_only_what_is_public(file):
+    assert not re.search(r"reojax(\.[a-z]\w*)*\._|from reojax import _|sys\.path", file.read_text())
 
 
 def test_only_the_plots_import_matplotlib():
     """Pictures are drawn in one package."""
     using = {name for name, file in MODULES.items() if "matplotlib" in file.read_text()}
-    assert {name.partition(".")[0] for name in using} == {"plot"}
+    assert {_room(name) for name in using} == {"plot"}
 
 
 def test_annotations_stay_strings():

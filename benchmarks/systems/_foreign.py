@@ -1,31 +1,8 @@
-"""Robots in other people's models, converted by the tests' `oracles.py`, and momentum to angular velocity."""
-
-import importlib.util
-from functools import cache
-from pathlib import Path
-from types import ModuleType
+"""Momentum matrices of other people's models to angular velocity."""
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-
-TESTS = Path(__file__).resolve().parents[2] / "tests"
-
-
-@cache
-def from_tests(name: str) -> ModuleType:
-    """Load a module of the tests from where it lies."""
-    spec = importlib.util.spec_from_file_location(name, TESTS / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def oracles() -> ModuleType:
-    """Load `tests/oracles.py`."""
-    return from_tests("oracles")
 
 
 def omega_of(momentum: np.ndarray, rate: np.ndarray) -> np.ndarray:

@@ -74,7 +74,7 @@ def _turn(w: jax.Array) -> jax.Array:
 
 
 def plain_error(reference: Reference) -> Callable[[int], float]:
-    """Return the error of this method with the plain equations of `reojax.momentum`, as a function of its steps."""
+    """Return the error of this method with `reojax.mechanics.momentum`, as a function of its steps."""
 
     def one(loop: Loops, steps: jax.Array) -> jax.Array:
         robot, corners = robot_of(loop), path_of(loop).waypoints

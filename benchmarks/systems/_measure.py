@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from reojax._session import usable_cores
+from reojax.session import usable_cores
 
 SAMPLE = 0.03
 """Least length of one sample [s]; short calls are repeated within it."""

@@ -12,12 +12,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from reojax import Robot
+from reojax import Robot, interop
 from reojax.robots import prototype
 from reojax.robots.prototype import END_INERTIA
 
 from . import _jax_rows, _magnus
-from ._foreign import omega_from_base_rows, oracles
+from ._foreign import omega_from_base_rows
 from ._rows import Row, optional
 from ._task import Loops, Reference, Task, objective
 
@@ -31,7 +31,7 @@ def rows(task: Task) -> Iterator[Row]:
     loops = task.loops._replace(inertia=np.full_like(task.loops.inertia, END_INERTIA))
     task = task._replace(loops=loops, reference=Reference(loops, task.checked))
     robot = prototype()
-    rotors = list(oracles().rotors(robot))
+    rotors = list(interop.rotors(robot))
     computations = adam.KinDynComputations(_urdf(robot), [*robot.joint_names, *(f"rotor{r.joint}" for r in rotors)])
     turns = np.zeros((len(rotors), 3))
     for index, rotor in enumerate(rotors):
@@ -71,7 +71,7 @@ def _urdf(robot: Robot) -> str:
     """Write the robot as URDF, its rotors as bodies without mass."""
     xml, inertia = Element("robot", name=robot.name), np.array(robot.inertia)
     joints = list(zip(robot.joint_names, robot.parent, robot.link_names[1:], robot.axis, robot.anchor, strict=True))
-    for rotor in oracles().rotors(robot):
+    for rotor in interop.rotors(robot):
         spun = rotor.inertia * np.outer(rotor.axis, rotor.axis)
         inertia[rotor.link] -= spun
         _link(xml, f"wheel{rotor.joint}", 0.0, np.zeros(3), spun)

@@ -11,8 +11,8 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec as P
 
 import reojax
 from reojax import Robot
-from reojax._fast.nodes import NODES
-from reojax.holonomy import DEFAULT_STEPS
+from reojax.mechanics._fast.nodes import NODES
+from reojax.mechanics.holonomy import DEFAULT_STEPS
 
 from . import _jax_rows
 from ._measure import CORES, compiled, fewest, measure

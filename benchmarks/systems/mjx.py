@@ -11,11 +11,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from reojax import so3
+from reojax import interop, so3
 from reojax.robots import prototype
 
 from . import _jax_rows, _magnus
-from ._foreign import omega_from_base_rows, oracles
+from ._foreign import omega_from_base_rows
 from ._rows import Row, optional
 from ._task import Loops, Task, robot_of
 
@@ -26,7 +26,7 @@ def rows(task: Task) -> Iterator[Row]:
     """Rows of `mjx.kinematics`, `com_pos`, `crb`."""
     optional("mujoco", "mujoco")
     mjx = optional("mujoco.mjx", "mujoco-mjx")
-    foreign = oracles().mujoco_model(prototype())
+    foreign = interop.mujoco_model(prototype())
     model, data = mjx.put_model(foreign.model), mjx.make_data(foreign.model)
     still = jnp.asarray(data.qpos[:7])
 

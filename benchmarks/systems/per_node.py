@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from reojax import interop
+
 from . import _magnus
-from ._foreign import omega_of, oracles
+from ._foreign import omega_of
 from ._measure import measure
 from ._rows import Row, optional, row
 from ._task import Loops, Task, robot_of
@@ -20,7 +22,7 @@ def pinocchio(task: Task) -> Iterator[Row]:
     pin = optional("pinocchio", "pin")
 
     def momentum(loop: Loops) -> Callable[[np.ndarray], np.ndarray]:
-        foreign = oracles().pinocchio_model(robot_of(loop))
+        foreign = interop.pinocchio_model(robot_of(loop))
         model, data, q = foreign.model, foreign.model.createData(), pin.neutral(foreign.model)
 
         def at(theta: np.ndarray) -> np.ndarray:
@@ -40,7 +42,7 @@ def mujoco(task: Task) -> Iterator[Row]:
     mj = optional("mujoco", "mujoco")
 
     def momentum(loop: Loops) -> Callable[[np.ndarray], np.ndarray]:
-        foreign = oracles().mujoco_model(robot_of(loop))
+        foreign = interop.mujoco_model(robot_of(loop))
         model, data = foreign.model, mj.MjData(foreign.model)
 
         def at(theta: np.ndarray) -> np.ndarray:

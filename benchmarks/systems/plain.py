@@ -1,4 +1,4 @@
-"""The definition, `reojax.momentum`, under vmap: what a reader of the equations would write in JAX."""
+"""The definition, `reojax.mechanics.momentum`, under vmap: what a reader of the equations would write in JAX."""
 
 from collections.abc import Iterator
 

@@ -11,9 +11,8 @@ from typing import Any
 import jax
 import numpy as np
 
-from reojax import so3
+from reojax import interop, so3
 
-from ._foreign import oracles
 from ._measure import CORES, measure
 from ._rows import Row, optional, row
 from ._task import Loops, Task, edges, robot_of
@@ -28,7 +27,7 @@ def rows(task: Task) -> Iterator[Row]:
     mj = optional("mujoco", "mujoco")
     rollout = optional("mujoco.rollout", "mujoco")
     loops = task.loops.first(8 if task.quick else 64)
-    foreign = [oracles().mujoco_model(robot_of(loop)) for loop in loops.each()]
+    foreign = [interop.mujoco_model(robot_of(loop)) for loop in loops.each()]
     commands = np.stack([_commands(loop) @ f.angles.T for loop, f in zip(loops.each(), foreign, strict=True)])
     for name, integrator in INTEGRATORS.items():
         models = [_with_servos(mj, f.model, integrator) for f in foreign]

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from reojax._shown import shown
+from reojax._internal.display_units import shown
 from reojax.cli._arguments import LARGEST_ANGLE
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from reojax.cli._motors import motor_at
 
 if TYPE_CHECKING:
-    from reojax.motion import Motion
+    from reojax.motion.simulation import Motion
     from reojax.path import Path
     from reojax.robot import Robot
 
@@ -25,7 +25,7 @@ def check_law(args: argparse.Namespace) -> None:
     Raises:
         ValueError: saying so.
     """
-    from reojax.time_law import by_name
+    from reojax.motion.time_laws import by_name
 
     if args.law is not None:
         by_name(args.law)
@@ -43,7 +43,7 @@ def motion_of(robot: "Robot", path: "Path", args: argparse.Namespace) -> "Motion
     """
     import numpy as np
 
-    from reojax.motion import DEFAULT_SAMPLES, simulate
+    from reojax.motion.simulation import DEFAULT_SAMPLES, simulate
 
     if args.duration is None:
         return None

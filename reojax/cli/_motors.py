@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from reojax.cli._arguments import SHORTEST
 
 if TYPE_CHECKING:
-    from reojax.motor import Motor
+    from reojax.motion.motor import Motor
 
 WEAKEST = 1e-3
 """Weakest supply at the command line [V]; no motor moves by less."""
@@ -46,7 +46,7 @@ def momentum(text: str) -> list[float]:
 
 def motor_at(supply: float) -> "Motor":
     """The prototype's motor at a supply [V]."""
-    from reojax.motor import RE_MAX_17
+    from reojax.motion.motor import RE_MAX_17
 
     return RE_MAX_17._replace(supply=supply)
 

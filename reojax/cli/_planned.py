@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from reojax.cli._arguments import SHORTEST, degrees
 
 if TYPE_CHECKING:
+    from reojax.motion.trajectory import Trajectory
     from reojax.robot import Robot
-    from reojax.trajectory import Trajectory
 
 
 def add_plan(parser: argparse.ArgumentParser, *, manoeuvre: str | None) -> None:
@@ -31,7 +31,7 @@ def planned(robot: "Robot", args: argparse.Namespace) -> "Trajectory":
     import numpy as np
 
     from reojax.manoeuvres import layout_for, manoeuvre_a, manoeuvre_b
-    from reojax.trajectory import along
+    from reojax.motion.trajectory import along
 
     if args.duration is None:
         raise ValueError("--duration is missing: seconds for each edge of the manoeuvre, or one number for all.")

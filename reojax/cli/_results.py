@@ -4,10 +4,10 @@ import argparse
 from math import prod
 from typing import TYPE_CHECKING, Any
 
-from reojax._shown import shown
+from reojax._internal.display_units import shown
 
 if TYPE_CHECKING:
-    from reojax.sweep import Sweep
+    from reojax.sweeps import Sweep
 
 _TOLD = 20
 """Bad designs that are printed; the files have all of them."""
@@ -26,7 +26,7 @@ def check_files(args: argparse.Namespace) -> None:
     Raises:
         ValueError: naming the file and what is wrong.
     """
-    from reojax._output import check_writable
+    from reojax._internal.files import check_writable
 
     if args.out is not None:
         if not args.out.endswith(".npz"):

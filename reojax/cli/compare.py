@@ -9,9 +9,9 @@ from reojax.cli._arguments import BadInput, version
 from reojax.cli._planned import add_plan, planned
 
 if TYPE_CHECKING:
-    from reojax.calibrate import Calibration
-    from reojax.capture import Capture
-    from reojax.comparison import Comparison, Sampled
+    from reojax.captures.calibration import Calibration
+    from reojax.captures.capture import Capture
+    from reojax.captures.comparison import Comparison, Sampled
     from reojax.robot import Robot
 
 
@@ -31,10 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Read, compute, write the picture, and print."""
-    from reojax import _session, robots
-    from reojax.capture import read_capture
+    from reojax import robots, session
+    from reojax.captures.capture import read_capture
 
-    _session.start()
+    session.start()
     try:
         if args.out is not None:
             _check_picture(args.out)
@@ -66,8 +66,8 @@ def _report(
 ) -> tuple[dict[str, Any], "Robot", "Comparison"]:
     import numpy as np
 
-    from reojax.calibrate import calibrate
-    from reojax.comparison import compare
+    from reojax.captures.calibration import calibrate
+    from reojax.captures.comparison import compare
 
     fit = None
     if args.calibrate is not None:
@@ -110,8 +110,8 @@ def _motion(robot: "Robot", args: argparse.Namespace) -> tuple["Sampled | None",
     import jax
     import numpy as np
 
-    from reojax.comparison import Sampled
-    from reojax.release import released
+    from reojax.captures.comparison import Sampled
+    from reojax.motion.release import released
 
     trajectory = planned(robot, args)
     motion = released(robot, trajectory, steps=64)

@@ -29,10 +29,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Compute, write, and print what was written."""
-    from reojax import _session, robots
-    from reojax.export import check_trajectory
+    from reojax import robots, session
+    from reojax.files.trajectories import check_trajectory
 
-    _session.start()
+    session.start()
     try:
         check_trajectory(args.file)
         report = _write(robots.by_name(args.robot), args)
@@ -46,8 +46,8 @@ def _write(robot: "Robot", args: argparse.Namespace) -> dict[str, Any]:
     import jax
     import numpy as np
 
-    from reojax.dynamics import inverse_dynamics
-    from reojax.export import write_trajectory
+    from reojax.files.trajectories import write_trajectory
+    from reojax.mechanics.dynamics import inverse_dynamics
 
     trajectory = planned(robot, args)
     duration = float(trajectory.duration)

@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Read, write, and print; exit status 1 if designs gave no finite result."""
-    from reojax.sweep import merge
+    from reojax.sweeps import merge
 
     try:
         check_files(args)

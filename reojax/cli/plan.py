@@ -10,7 +10,7 @@ from reojax.cli._arguments import BadInput, degrees, version
 if TYPE_CHECKING:
     import numpy as np
 
-    from reojax.plan import FreePaths, Plan
+    from reojax.planning import FreePaths, Plan
     from reojax.robot import Robot
 
 _KINDS = {"rotvec": 3, "zxz": 3, "quat": 4}
@@ -42,9 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Compute, write the files, and print."""
-    from reojax import _session, robots
+    from reojax import robots, session
 
-    _session.start()
+    session.start()
     try:
         robot = robots.by_name(args.robot)
         target = read_target(args.target)
@@ -68,7 +68,7 @@ def read_target(text: str) -> "np.ndarray":
     import numpy as np
 
     from reojax import so3
-    from reojax.plan import checks
+    from reojax.planning import checks
 
     kind, *rest = text.split(None, 1)[:2] or [""]
     words = rest[0] if rest else ""
@@ -110,7 +110,7 @@ def _read_matrix(name: str) -> "np.ndarray":
 
 
 def _check_files(args: argparse.Namespace) -> None:
-    from reojax._output import check_writable
+    from reojax._internal.files import check_writable
 
     if args.out is not None or args.animate is not None:
         from reojax import plot
@@ -128,7 +128,7 @@ def _check_files(args: argparse.Namespace) -> None:
 def _plan(robot: "Robot", target: "np.ndarray", args: argparse.Namespace) -> "Plan | FreePaths":
     import numpy as np
 
-    from reojax.plan import free_path, plan
+    from reojax.planning import free_path, plan
 
     twist_limit, bend_limit = float(np.deg2rad(args.twist_limit)), float(np.deg2rad(args.bend_limit))
     if args.vocabulary == "free":
@@ -149,7 +149,7 @@ def _plan(robot: "Robot", target: "np.ndarray", args: argparse.Namespace) -> "Pl
 def _write_files(robot: "Robot", plan: "Plan | FreePaths", target: "np.ndarray", args: argparse.Namespace) -> None:
     import numpy as np
 
-    from reojax._output import replacing
+    from reojax._internal.files import replacing
 
     if args.csv is not None:
         rows = [",".join(f"{name} [deg]" for name in robot.joint_names)]
@@ -173,7 +173,7 @@ def _write_files(robot: "Robot", plan: "Plan | FreePaths", target: "np.ndarray",
 def _report(robot: "Robot", plan: "Plan | FreePaths", target: "np.ndarray", args: argparse.Namespace) -> dict[str, Any]:
     import numpy as np
 
-    from reojax.plan import Plan
+    from reojax.planning import Plan
 
     drawn = plan.travel > 0
     loops = (plan.word, plan.twist, plan.bend, plan.last_twist) if isinstance(plan, Plan) else ((), (), (), ())

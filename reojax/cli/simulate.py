@@ -10,7 +10,7 @@ from reojax.cli._motion import LAW, check_law, motion_of, motion_report, motion_
 from reojax.cli._motors import add_motors, momentum, seconds
 
 if TYPE_CHECKING:
-    from reojax.motion import Motion
+    from reojax.motion.simulation import Motion
     from reojax.path import Path
     from reojax.robot import Robot
 
@@ -33,9 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Compute, write the picture, and print."""
-    from reojax import _session, robots
+    from reojax import robots, session
 
-    _session.start()
+    session.start()
     try:
         robot = robots.by_name(args.robot)
         path = path_of(robot, args)
@@ -76,9 +76,9 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
     import numpy as np
 
     from reojax import so3
-    from reojax._orientation import tilt_and_roll
-    from reojax.certificate import DEFAULT_SAMPLES, certified_rotation
-    from reojax.holonomy import DEFAULT_STEPS
+    from reojax.mechanics.attitude import tilt_and_roll
+    from reojax.mechanics.certificate import DEFAULT_SAMPLES, certified_rotation
+    from reojax.mechanics.holonomy import DEFAULT_STEPS
 
     longest = np.rad2deg(np.abs(np.diff(path.waypoints, axis=0)).max())
     finer = max(1, int(np.ceil(longest / _RESOLVED - 1e-9)))

@@ -6,7 +6,7 @@ import re
 import sys
 from math import prod
 
-from reojax._shown import shown
+from reojax._internal.display_units import shown
 from reojax.cli._arguments import BadInput, degrees
 from reojax.cli._axes import AXES, axis, check_names
 from reojax.cli._results import add_files, check_files, complaint, table, write
@@ -43,12 +43,12 @@ def run(args: argparse.Namespace) -> None:
     import jax
     import numpy as np
 
-    from reojax import _session, robots
-    from reojax.sweep.run import computed
-    from reojax.sweep.turns import turn_function
+    from reojax import robots, session
+    from reojax.cli._turns import turn_function
+    from reojax.sweeps.sweep import computed
 
-    _session.start()
-    _session.one_device_per_core()
+    session.start()
+    session.one_device_per_core()
     try:
         _check(args)
         if args.coordinator is not None:
@@ -120,6 +120,6 @@ def _check(args: argparse.Namespace) -> None:
         raise ValueError("--picture needs an axis of two values or more.")
     check_files(args)
     if args.store is not None and (args.out or args.picture):
-        from reojax.sweep.memory import check_memory
+        from reojax.sweeps.memory import check_memory
 
         check_memory(prod(axis.size for axis in args.axes), 8 * len(args.outputs), "leave out --out and --picture")

@@ -9,7 +9,7 @@ from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, path_of
 from reojax.cli._motors import add_motors, motor_at
 
 if TYPE_CHECKING:
-    from reojax.motion import Motion
+    from reojax.motion.simulation import Motion
     from reojax.path import Path
     from reojax.robot import Robot
 
@@ -24,10 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Compute, write the picture, and print."""
-    from reojax import _session, robots
-    from reojax.time_law import by_name
+    from reojax import robots, session
+    from reojax.motion.time_laws import by_name
 
-    _session.start()
+    session.start()
     try:
         by_name(args.law)
         robot = robots.by_name(args.robot)
@@ -48,8 +48,8 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
     """Everything that is printed, as plain numbers, and the motion at the least durations."""
     import numpy as np
 
-    from reojax.minimum_time import AVAILABLE, FALL, minimum_time
-    from reojax.motion import simulate
+    from reojax.motion.least_time import AVAILABLE, FALL, minimum_time
+    from reojax.motion.simulation import simulate
 
     motors = motor_at(args.supply)
     least = minimum_time(robot, path, motors, args.law)

@@ -1,14 +1,6 @@
 """Design by gradients: pose a problem over a robot and its loop, solve it, and say how certain the answer is."""
 
-from reojax.design.certainty import (
-    Sensitivities as Sensitivities,
-    Spread as Spread,
-    scatter as scatter,
-    sensitivities as sensitivities,
-    spread as spread,
-)
-from reojax.design.descent import descend as descend
-from reojax.design.edits import (
+from reojax.design.link_edits import (
     with_com_offset as with_com_offset,
     with_joint_inertia as with_joint_inertia,
     with_length as with_length,
@@ -27,5 +19,13 @@ from reojax.design.measures import (
 )
 from reojax.design.problem import Outcome as Outcome, Problem as Problem
 from reojax.design.smooth import fourier_loops as fourier_loops, spline_loops as spline_loops
-from reojax.design.solver import Solution as Solution, optimise as optimise
+from reojax.design.uncertainty import (
+    Sensitivities as Sensitivities,
+    Spread as Spread,
+    scatter as scatter,
+    sensitivities as sensitivities,
+    spread as spread,
+)
 from reojax.design.variables import Space as Space, Variable as Variable
+from reojax.optimisation.adam import descend as descend
+from reojax.optimisation.optimise import Solution as Solution, optimise as optimise

@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._arrays import Array
-from reojax._robot_checks import numbers
+from reojax._internal.arrays import Array
+from reojax._internal.robot_checks import numbers
 from reojax.design.variables import Variable
 from reojax.manoeuvres import Layout, layout_for
 from reojax.path import Path

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax import so3
-from reojax._arrays import Array
-from reojax._robot_checks import numbers
+from reojax._internal.arrays import Array
+from reojax._internal.robot_checks import numbers
 from reojax.design.loops import Loops
 from reojax.design.problem import Measure, Outcome
 from reojax.path import joint_travel

@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._arrays import Array
+from reojax._internal.arrays import Array
 from reojax.design.loops import Loops
-from reojax.design.solver import Solution, optimise
 from reojax.design.variables import Space, Variable
-from reojax.holonomy import DEFAULT_STEPS, net_rotation
+from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation
+from reojax.optimisation.optimise import Solution, optimise
 from reojax.path import Path
 from reojax.robot import Robot
 

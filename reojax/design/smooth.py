@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reojax._arrays import Array
+from reojax._internal.arrays import Array
 from reojax.design.loops import Loops, limits_of
 from reojax.design.variables import Variable
 from reojax.path import Path

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._arrays import Array, as_numbers
+from reojax._internal.arrays import Array, as_numbers
 
 SI = {
     "": 1.0,

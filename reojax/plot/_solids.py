@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from reojax._arrays import Array
+from reojax._internal.arrays import Array
 from reojax.robot import Robot
 
 Faces = Float[np.ndarray, "f 4 3"]

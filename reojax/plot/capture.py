@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reojax.comparison import Comparison
+from reojax.captures.comparison import Comparison
 from reojax.plot._style import GREY, INK, JOINTS, PALE, legend_above
 from reojax.robot import Robot
 

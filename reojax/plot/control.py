@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from numpy.typing import ArrayLike
 
-from reojax._arrays import Array
-from reojax._orientation import tilt_and_roll
-from reojax.control import Tracking
+from reojax._internal.arrays import Array
+from reojax.mechanics.attitude import tilt_and_roll
+from reojax.motion.pid import Tracking
 from reojax.plot._style import GREY, INK, JOINTS, PALE
 from reojax.robot import Robot
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from reojax._output import check_ending, replacing
+from reojax._internal.files import check_ending, replacing
 
 FORMATS = ("png", "pdf", "svg")
 """Kinds of picture, by the ending of the file's name."""

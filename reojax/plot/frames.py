@@ -16,9 +16,9 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from PIL import Image
 from tqdm import tqdm
 
-from reojax._arrays import as_numbers
-from reojax._output import check_writable, replacing
-from reojax.holonomy import rotation_history
+from reojax._internal.arrays import as_numbers
+from reojax._internal.files import check_writable, replacing
+from reojax.mechanics.holonomy import rotation_history
 from reojax.path import Path
 from reojax.plot._style import INK
 from reojax.plot._view import View

@@ -10,9 +10,9 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reojax._arrays import Array
-from reojax._orientation import LEVEL, tilt_and_roll, zxz_without_jumps
-from reojax.holonomy import rotation_history
+from reojax._internal.arrays import Array
+from reojax.mechanics.attitude import LEVEL, tilt_and_roll, zxz_without_jumps
+from reojax.mechanics.holonomy import rotation_history
 from reojax.path import Path
 from reojax.plot._style import ANGLES, DASHES, INK, JOINTS, dress
 from reojax.robot import Robot

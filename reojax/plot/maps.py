@@ -10,7 +10,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
-from reojax._arrays import Array
+from reojax._internal.arrays import Array
 from reojax.plot._style import GREY, INK, PALE
 from reojax.plot._view import View
 from reojax.plot.robots import draw_robot_flat, posed_faces

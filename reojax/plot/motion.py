@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reojax._orientation import tilt_and_roll
-from reojax.motion import Motion
-from reojax.motor import Motor
+from reojax.mechanics.attitude import tilt_and_roll
+from reojax.motion.motor import Motor
+from reojax.motion.simulation import Motion
 from reojax.plot._style import ANGLES, DASHES, GREY, INK, JOINTS, PALE
 from reojax.robot import Robot
 

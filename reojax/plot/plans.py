@@ -7,10 +7,10 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-from reojax._arrays import Array
-from reojax.holonomy import rotation_history
+from reojax._internal.arrays import Array
+from reojax.mechanics.holonomy import rotation_history
 from reojax.path import polygon
-from reojax.plan import FreePaths, Plan
+from reojax.planning import FreePaths, Plan
 from reojax.plot._style import GREY, INK, PALE, dress
 from reojax.plot.history import draw_joints
 from reojax.robot import Robot

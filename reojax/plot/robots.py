@@ -15,7 +15,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from numpy.typing import ArrayLike
 
-from reojax._arrays import as_numbers
+from reojax._internal.arrays import as_numbers
 from reojax.plot._solids import Faces, joint_faces, link_faces
 from reojax.plot._style import BASE, INK, LINKS
 from reojax.plot._view import View, check_view, shaded
@@ -160,7 +160,7 @@ def _parts(robot: Robot) -> tuple[list[Faces], list[Faces]]:
 def poses(robot: Robot, theta: np.ndarray) -> tuple[Float[np.ndarray, "n 3 3"], Float[np.ndarray, "n 3"]]:
     """Orientation and origin of each link's frame, from the robot's centre of mass, in the base frame.
 
-    As `reojax.momentum.kinematics`, which is for JAX to compile; a picture needs a pose at once.
+    As `reojax.mechanics.momentum.kinematics`, which is for JAX to compile; a picture needs a pose at once.
     """
     turned, origin = [np.eye(3)], [np.zeros(3)]
     axis, anchor, com = (np.asarray(x, float) for x in (robot.axis, robot.anchor, robot.com))

@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reojax._shown import shown
+from reojax._internal.display_units import shown
 from reojax.plot._style import GREY, INK, PALE
 
 if TYPE_CHECKING:
-    from reojax.sweep import Sweep
+    from reojax.sweeps import Sweep
 
 _MOST = 6
 """Most results in one picture."""

@@ -41,9 +41,9 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reojax._arrays import is_concrete
+from reojax._internal.arrays import is_concrete
 from reojax.robot import Robot, make_robot
-from reojax.robots._solids import Solid, cube, cylinder, half_turn_y, join
+from reojax.robots.parts import Solid, cube, cylinder, half_turn_y, join
 
 TOTAL_MASS = 0.3
 """Mass of the robot [kg] (thesis 2.6)."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from reojax.robot import Robot, make_robot
-from reojax.robots._solids import half_turn_y
+from reojax.robots.parts import half_turn_y
 from reojax.robots.prototype import (
     BEND_LIMIT,
     GEAR_RATIO,

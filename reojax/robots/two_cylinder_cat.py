@@ -3,7 +3,7 @@
 import numpy as np
 
 from reojax.robot import Robot, make_robot
-from reojax.robots._solids import Solid, cylinder
+from reojax.robots.parts import Solid, cylinder
 
 _MASS = 1.5
 """Mass of each half [kg] (chosen; it plays no part)."""

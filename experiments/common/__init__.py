@@ -1,0 +1,1 @@
+"""What several experiments share: options, replays by other people's mechanics, tables."""

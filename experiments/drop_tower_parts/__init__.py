@@ -1,0 +1,1 @@
+"""Parts of `drop_tower.py`."""

@@ -1,0 +1,1 @@
+"""Parts of `thesis_figures.py`."""

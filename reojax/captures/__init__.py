@@ -1,0 +1,1 @@
+"""Captured motion beside simulation, and a robot's numbers from it."""

@@ -1,0 +1,346 @@
+"""Fit a robot's numbers to a capture: joint angles in, orientation of the base compared, by Gauss-Newton steps.
+
+The measured joint angles, joined by straight edges, give the orientation by the momentum equation. Its distance from
+the measured one, frame by frame, is the residual
+
+    rho_i = log(M_i (G R_i(x))^T),
+
+`M_i` the measured orientation, `R_i` the simulated one for the parameters x, `G` the frame of the cameras. Each edge
+turns the base by `exp(phi_k)`; with `delta_k`, the effect of x on it in the base frame, the derivative of `R_i` is a
+running sum, `d rho_i = -G sum_{k<i} R_{k+1} delta_k`, so all derivatives cost about one pass along the capture.
+
+What the fit does not know has two sources: the scatter of the residuals, and the noise of the joint angles, which
+pushes all later orientations the same way. The covariance has both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from reojax import so3
+from reojax._internal.arrays import Array
+from reojax.captures.capture import Capture
+from reojax.captures.comparison import BLOCK, align_frames, filled, interpolated
+from reojax.captures.parameters import Parameter, Put, chosen
+from reojax.mechanics.momentum import connection
+from reojax.robot import Robot
+
+SINGULAR = 1e-6
+"""Smallest singular value of the derivatives, columns of length one, that counts as telling parameters apart."""
+VAGUE = 0.5
+"""Standard deviation, as a share of a parameter's scale (or of a positive one's value, if that is smaller), beyond
+which the capture does not determine it."""
+
+
+class Calibration(NamedTuple):
+    """Fitted parameters and how well they are known."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    start: Float[np.ndarray, " p"]
+    """Values before the fit."""
+    values: Float[np.ndarray, " p"]
+    """Fitted values."""
+    std: Float[np.ndarray, " p"]
+    """Standard deviations; infinite for parameters that the capture cannot tell apart."""
+    covariance: Float[np.ndarray, "p p"]
+    """Of the parameters; frame and clock are accounted for. NaN where the standard deviation is infinite."""
+    robot: Robot
+    """The robot with the fitted values."""
+    frame: Float[np.ndarray, "3 3"]
+    """Orientation of the first joint frame's base in the cameras' frame."""
+    offset: float
+    """Time by which the cameras' clock is ahead of the joints' [s]."""
+    offset_std: float
+    rms_before: float
+    """RMS angle between measured and simulated orientation at the start values, frame and clock fitted [rad]."""
+    rms: float
+    """The same at the fitted values."""
+    joint_noise: float
+    """Standard deviation of the joint angles' noise that was reckoned with [rad]."""
+    condition: float
+    """Ratio of the largest to the smallest singular value of the derivatives, columns scaled to length one."""
+    identifiable: tuple[bool, ...]
+    """For each parameter, whether its standard deviation is below half its scale, or value."""
+    warning: str
+    """What the capture does not tell, in words; empty if all is well."""
+    converged: bool
+    steps: int
+
+
+def calibrate(
+    robot: Robot,
+    capture: Capture,
+    parameters: Iterable[str | Parameter] = ("end_inertia",),
+    *,
+    clock: bool = True,
+    joint_noise: float | None = None,
+    max_steps: int = 50,
+) -> Calibration:
+    """Fit parameters of a robot to a capture that has joint angles and orientation.
+
+    Args:
+        robot: the robot, with the values to start from.
+        capture: what was measured.
+        parameters: names ("end_inertia", "rotor_inertia", "gear_ratio", or entries such as "com[0,2]"), or
+            `Parameter`s of your own. Scaling all masses and inertias together changes nothing that can be measured.
+        clock: fit a shift between the clocks of joints and cameras too. The frame of the cameras is always fitted.
+        joint_noise: standard deviation of the joint angles' noise [rad]; default from their fourth differences.
+        max_steps: most Levenberg-Marquardt steps.
+
+    Raises:
+        ValueError: if the capture lacks joints or orientation, or does not fit the robot, or for an unknown parameter.
+    """
+    if not isinstance(robot, Robot):
+        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
+    fitted = chosen(robot, parameters)
+    problem = _Problem(robot, capture, fitted, clock)
+    noise = _joint_noise(capture) if joint_noise is None else float(joint_noise)
+    if not (np.isfinite(noise) and noise >= 0):
+        raise ValueError(f"`joint_noise` is {joint_noise}; it must be a finite angle in radians, not negative.")
+
+    start = np.array([p.start for p in fitted])
+    state = problem.settled(start)
+    before, damping, converged, step = state.rms, 1e-6, False, 0
+    for step in range(1, max_steps + 1):  # noqa: B007
+        tried = problem.moved(state, damping)
+        if tried.cost <= state.cost * (1 + 1e-12):
+            change = np.abs((tried.x - state.x) / problem.scale).max(initial=0)
+            gain = state.cost - tried.cost
+            state, damping = tried, max(damping / 10, 1e-12)
+            converged = change < 1e-6 or gain < 1e-10 * state.cost
+            if converged:
+                break
+        else:
+            damping *= 10
+            if damping > 1e6:
+                break
+    return problem.report(state, noise, before, bool(converged), step, start)
+
+
+class _State(NamedTuple):
+    """Everything at one set of parameters, frame and shift."""
+
+    x: np.ndarray
+    frame: np.ndarray
+    offset: float
+    cost: float
+    rms: float
+    residual: np.ndarray
+    """(f, 3) in the cameras' frame."""
+    derivative: np.ndarray
+    """(f, 3, p + 3 or 4): by scaled parameters, frame, shift."""
+    turned: np.ndarray
+    """(m, 3, 3) simulated orientation at all frames."""
+    joint_effect: np.ndarray
+    """(m - 1, 3, 2 j): turn, seen from the start, by which a change of an edge's two ends moves all that follows."""
+
+
+class _Problem:
+    """A capture and the parameters to be fitted to it."""
+
+    def __init__(self, robot: Robot, capture: Capture, fitted: tuple[Parameter, ...], clock: bool) -> None:
+        if not isinstance(capture, Capture):
+            raise ValueError(f"`capture` is a {type(capture).__name__}; it must be a Capture.")
+        if capture.theta is None or not capture.seen_rotation.any():
+            raise ValueError("a calibration needs joint angles and orientation; the capture lacks one of them.")
+        if capture.theta.shape[1] != robot.joints:
+            raise ValueError(f"the capture has {capture.theta.shape[1]} joints; {robot.name!r} has {robot.joints}.")
+        theta = filled(capture)
+        self.robot, self.fitted, self.clock, self.time = robot, fitted, clock, capture.time
+        self.seen = np.flatnonzero(capture.seen_rotation)
+        self.measured = np.asarray(capture.rotation)[self.seen]
+        self.edges = len(theta) - 1
+        ends = np.minimum(np.arange(-(-self.edges // BLOCK) * BLOCK + 1), self.edges)
+        self.theta = theta[ends]
+        self.scale = np.array([p.scale for p in fitted])
+        unknowns = len(fitted) + 3 + clock
+        if 3 * len(self.seen) <= unknowns:
+            raise ValueError(f"{len(self.seen)} frames with an orientation cannot determine {unknowns} numbers.")
+
+    def settled(self, x: np.ndarray) -> _State:
+        """The state at the parameters `x`, frame and shift at their best."""
+        turned, _ = self._turned(x)
+        state = self._state(x, align_frames(self.measured, turned[self.seen]), 0.0)
+        for _ in range(10 if self.clock else 3):
+            state = self._state(x, *self._nuisance(state, self._step(state, 1e-12, fixed=True)))
+        return state
+
+    def moved(self, state: _State, damping: float) -> _State:
+        """The state after a damped step from `state`."""
+        step = self._step(state, damping)
+        x = state.x + step[: len(state.x)] * self.scale
+        positive = np.array([p.positive for p in self.fitted])
+        x = np.where(positive, np.clip(x, 0.3 * state.x, 3 * state.x), x)
+        return self._state(x, *self._nuisance(state, step))
+
+    def _step(self, state: _State, damping: float, fixed: bool = False) -> np.ndarray:
+        jacobian = state.derivative.reshape(-1, state.derivative.shape[-1]).copy()
+        if fixed:
+            jacobian[:, : len(state.x)] = 0
+        lengths = np.linalg.norm(jacobian, axis=0)
+        columns = jacobian / np.where(lengths > 0, lengths, 1)
+        normal = columns.T @ columns + damping * np.eye(len(lengths))
+        return -np.linalg.solve(normal, columns.T @ state.residual.ravel()) / np.where(lengths > 0, lengths, 1)
+
+    def _nuisance(self, state: _State, step: np.ndarray) -> tuple[np.ndarray, float]:
+        from scipy.spatial.transform import Rotation
+
+        rest = step[len(state.x) :]
+        most = 0.25 * float(np.ptp(self.time))
+        offset = float(np.clip(state.offset + rest[3], -most, most)) if self.clock else 0.0
+        return Rotation.from_rotvec(rest[:3]).as_matrix() @ state.frame, offset
+
+    def _turned(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Orientation at every frame, and the effect of parameters and ends of each edge on all later ones."""
+        turns, effect = _edges(tuple(p.put for p in self.fitted), x, self.robot, self.theta)
+        turns, effect = np.asarray(turns)[: self.edges], np.asarray(effect)[: self.edges]
+        turned = np.empty((self.edges + 1, 3, 3))
+        turned[0] = np.eye(3)
+        for k, turn in enumerate(turns):
+            turned[k + 1] = turned[k] @ turn
+        return turned, turned[1:] @ effect
+
+    def _state(self, x: np.ndarray, frame: np.ndarray, offset: float) -> _State:
+        from scipy.spatial.transform import Rotation
+
+        turned, effect = self._turned(x)
+        when = np.clip(self.time[self.seen] - offset, self.time[0], self.time[-1])
+        residual = Rotation.from_matrix(
+            self.measured @ (frame @ interpolated(self.time, turned)(when)).swapaxes(1, 2)
+        ).as_rotvec()
+        p = len(x)
+        running = np.concatenate([np.zeros((1, 3, p)), np.cumsum(effect[..., :p] * self.scale, axis=0)])
+        edge = np.clip(np.searchsorted(self.time, when, side="right") - 1, 0, self.edges - 1)
+        length = np.diff(self.time)[edge]
+        part = ((when - self.time[edge]) / length)[:, None, None]
+        columns = [-frame @ ((1 - part) * running[edge] + part * running[edge + 1])]
+        columns.append(np.broadcast_to(-np.eye(3), (len(when), 3, 3)))
+        if self.clock:
+            turn = Rotation.from_matrix(turned[edge + 1] @ turned[edge].swapaxes(1, 2)).as_rotvec()
+            columns.append((turn / length[:, None] @ frame.T)[..., None])
+        cost = float((residual**2).sum())
+        return _State(
+            x=x,
+            frame=frame,
+            offset=offset,
+            cost=cost if np.isfinite(cost) else np.inf,
+            rms=float(np.sqrt((residual**2).sum(axis=1).mean())),
+            residual=residual,
+            derivative=np.concatenate(columns, axis=2),
+            turned=turned,
+            joint_effect=effect[..., p:],
+        )
+
+    def report(
+        self, state: _State, noise: float, before: float, converged: bool, steps: int, start: np.ndarray
+    ) -> Calibration:
+        """Covariance and verdict at the end of the fit."""
+        p = len(state.x)
+        jacobian = state.derivative.reshape(-1, state.derivative.shape[-1])
+        lengths = np.linalg.norm(jacobian, axis=0)
+        lengths = np.where(lengths > 0, lengths, 1.0)
+        _, singular, directions = np.linalg.svd(jacobian / lengths, full_matrices=False)
+        known = singular > SINGULAR * singular[0]
+        lost = (np.abs(directions[~known]) > 0.01).any(axis=0) | (np.linalg.norm(jacobian, axis=0) == 0)
+        inverse = (directions[known].T / singular[known] ** 2) @ directions[known] / np.outer(lengths, lengths)
+        spread = state.cost / max(1, jacobian.shape[0] - jacobian.shape[1])
+        pull = noise * self._pull(state)
+        unit = np.concatenate([self.scale, np.ones(jacobian.shape[1] - p)])
+        covariance = (spread * inverse + inverse @ (pull @ pull.T) @ inverse) * np.outer(unit, unit)
+        std = np.where(lost, np.inf, np.sqrt(np.diag(covariance)))
+        covariance[lost, :] = covariance[:, lost] = np.nan
+        robot = self.robot
+        for parameter, value in zip(self.fitted, state.x, strict=True):
+            robot = parameter.put(robot, value)
+        positive = np.array([parameter.positive for parameter in self.fitted])
+        size = np.where(positive, np.minimum(self.scale, state.x), self.scale)
+        identifiable = tuple(bool(known) for known in std[:p] < VAGUE * size)
+        names = tuple(parameter.name for parameter in self.fitted)
+        return Calibration(
+            names=names,
+            units=tuple(parameter.unit for parameter in self.fitted),
+            start=start,
+            values=state.x,
+            std=std[:p],
+            covariance=covariance[:p, :p],
+            robot=robot,
+            frame=state.frame,
+            offset=state.offset,
+            offset_std=float(std[-1]) if self.clock else 0.0,
+            rms_before=before,
+            rms=state.rms,
+            joint_noise=noise,
+            condition=float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf,
+            identifiable=identifiable,
+            warning=_warning(names, lost[:p], identifiable),
+            converged=converged,
+            steps=steps,
+        )
+
+    def _pull(self, state: _State) -> np.ndarray:
+        """(unknowns, m j): how the noise of each joint angle pushes the fit's normal equations."""
+        weight = np.zeros((len(self.time), 3, state.derivative.shape[-1]))
+        weight[self.seen] = -state.frame.T @ state.derivative
+        later = np.cumsum(weight[:0:-1], axis=0)[::-1]
+        ends = np.einsum("kxu,kxe->uke", later, state.joint_effect)
+        joints = ends.shape[2] // 2
+        pull = np.zeros((ends.shape[0], len(self.time), joints))
+        pull[:, :-1] += ends[..., :joints]
+        pull[:, 1:] += ends[..., joints:]
+        return pull.reshape(ends.shape[0], -1)
+
+
+def _warning(names: tuple[str, ...], lost: np.ndarray, identifiable: tuple[bool, ...]) -> str:
+    confused = [name for name, is_lost in zip(names, lost, strict=True) if is_lost]
+    vague = [name for name, good in zip(names, identifiable, strict=True) if not good and name not in confused]
+    parts = []
+    if confused:
+        apart = "cannot be told apart" if len(confused) > 1 else "has no effect of its own"
+        parts.append(f"{' and '.join(confused)} {apart} by this capture")
+    if vague:
+        parts.append(f"{' and '.join(vague)} {'are' if len(vague) > 1 else 'is'} hardly determined by this capture")
+    return "; ".join(parts)
+
+
+def _joint_noise(capture: Capture) -> float:
+    """Standard deviation of white noise in the joint angles [rad], from fourth differences of even frames."""
+    step = np.diff(capture.time)
+    even = np.abs(step - np.median(step)) < 0.05 * np.median(step)
+    runs = np.flatnonzero(even[:-3] & even[1:-2] & even[2:-1] & even[3:])
+    if not runs.size:
+        return 0.0
+    windows = np.asarray(capture.theta)[runs[:, None] + np.arange(5)]
+    differences = np.einsum("w,rwj->rj", np.array([1.0, -4, 6, -4, 1]), windows)
+    differences = differences[np.isfinite(differences)]
+    return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(70)) if differences.size else 0.0
+
+
+@partial(jax.jit, static_argnums=0)
+def _edges(puts: tuple[Put, ...], x: Array, robot: Robot, theta: Array) -> tuple[Array, Array]:
+    """Turn of the base along every edge (e, 3, 3), and its derivative (e, 3, p + 2 j) in the frame at its end."""
+    joints = theta.shape[1]
+
+    def exponent(numbers: Array) -> Array:
+        """Magnus expansion to fourth order, two Gauss nodes."""
+        changed: Any = robot
+        for k, put in enumerate(puts):
+            changed = put(changed, numbers[k])
+        start, end = jnp.split(numbers[len(puts) :], [joints])
+        nodes = jnp.stack([start + (0.5 + s / np.sqrt(12)) * (end - start) for s in (-1, 1)])
+        first, second = jax.vmap(lambda node: connection(changed, node) @ (end - start))(nodes)
+        return 0.5 * (first + second) + np.sqrt(3) / 12 * jnp.cross(first, second)
+
+    def edge(start: Array, end: Array) -> tuple[Array, Array]:
+        numbers = jnp.concatenate([jnp.asarray(x), start, end])
+        phi = exponent(numbers)
+        return so3.exp(phi), so3.left_jacobian(-phi) @ jax.jacfwd(exponent)(numbers)
+
+    return jax.vmap(edge)(jnp.asarray(theta[:-1]), jnp.asarray(theta[1:]))

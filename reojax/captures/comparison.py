@@ -1,0 +1,294 @@
+"""Measured against simulated motion: clocks and frames aligned, errors in the thesis's terms (figures 1.9, 2.13).
+
+A capture's clock starts anywhere, and its cameras have a frame of their own. So the simulated motion is first
+shifted in time to where it fits best, by less than a frame too, and then both orientations are told from where
+the robot starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from jaxtyping import Float
+
+from reojax._internal.arrays import Array
+from reojax.captures.capture import Capture
+from reojax.mechanics.attitude import tilt_and_roll, zxz_beside, zxz_without_jumps
+from reojax.mechanics.holonomy import rotation_history
+from reojax.path import polygon
+from reojax.robot import Robot
+
+_SHIFTS_PER_MOTION = 200
+_LONGEST = 100
+"""Largest ratio of the capture's duration to the motion's in which the motion is looked for."""
+_AT_REST = 0.02
+"""Turn of the base within which it counts as not having started [rad]."""
+BLOCK = 256
+"""Sampled paths are filled up to a multiple of this many edges, so that few programs are compiled."""
+
+
+class Simulated(Protocol):
+    """What a capture is compared with, such as a `Motion`: at rest before its first and after its last time."""
+
+    @property
+    def time(self) -> Float[Array, " k"]:
+        """Times [s], increasing."""
+        ...
+
+    @property
+    def theta(self) -> Float[Array, "k j"]:
+        """Joint angles [rad]."""
+        ...
+
+    @property
+    def rotation(self) -> Float[Array, "k 3 3"]:
+        """Orientation of the base."""
+        ...
+
+
+class Sampled(NamedTuple):
+    """A motion known at some times."""
+
+    time: Float[np.ndarray, " k"]
+    theta: Float[np.ndarray, "k j"]
+    rotation: Float[np.ndarray, "k 3 3"]
+
+
+class Comparison(NamedTuple):
+    """A capture beside a simulation, frame by frame; NaN where something was not seen.
+
+    Orientations are told from the start of the simulated motion. ZXZ angles are counted on where they jump, and of
+    the measured ones those nearest to the simulated are taken; tilt and roll (`R = exp((tilt_x, tilt_y, 0)) Rz(roll)`)
+    have no jumps anyway.
+    """
+
+    offset: float
+    """Time of the capture at which the simulation's clock is zero [s]."""
+    offset_found: bool
+    """Whether the offset is one that fits best, inside the times that were tried, and not given or at their edge."""
+    time: Float[np.ndarray, " m"]
+    """Times of the frames on the simulation's clock [s]."""
+    measured_theta: Float[np.ndarray, "m j"]
+    simulated_theta: Float[np.ndarray, "m j"]
+    measured_rotation: Float[np.ndarray, "m 3 3"]
+    simulated_rotation: Float[np.ndarray, "m 3 3"]
+    measured_zxz: Float[np.ndarray, "m 3"]
+    simulated_zxz: Float[np.ndarray, "m 3"]
+    measured_tilt_roll: Float[np.ndarray, "m 3"]
+    """Tilt about x, tilt about y, roll about z [rad]."""
+    simulated_tilt_roll: Float[np.ndarray, "m 3"]
+    theta_rms: Float[np.ndarray, " j"]
+    """RMS difference of each joint angle [rad]; NaN without measured joints."""
+    zxz_rms: Float[np.ndarray, "3"]
+    """RMS difference of each ZXZ angle [rad]; NaN without measured orientation."""
+    tilt_roll_rms: Float[np.ndarray, "3"]
+    angle_rms: float
+    """RMS angle between the two orientations [rad]."""
+
+
+def joints_simulated(robot: Robot, capture: Capture) -> Sampled:
+    """Motion that follows from the measured joint angles: the base's orientation by `A omega = B theta_dot`.
+
+    Gaps of a joint are filled by monotone cubics (PCHIP) between the frames in which it was seen, and held at the ends.
+
+    Raises:
+        ValueError: if the capture has no joint angles, other ones than the robot's, or a joint was never seen.
+    """
+    _check_joints(robot, capture)
+    if capture.theta is None:
+        raise ValueError("the capture has no joint angles, so its orientation cannot be simulated from them.")
+    theta = filled(capture)
+    edges = -(-(len(theta) - 1) // BLOCK) * BLOCK
+    padded = np.concatenate([theta, np.repeat(theta[-1:], edges + 1 - len(theta), axis=0)])
+    history = np.asarray(rotation_history(robot, polygon(padded), samples=1), float)
+    return Sampled(capture.time, theta, history[: len(theta)])
+
+
+def filled(capture: Capture) -> Float[np.ndarray, "m j"]:
+    """Joint angles of a capture, gaps filled in [rad].
+
+    Raises:
+        ValueError: if a joint was never seen.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    theta = np.array(capture.theta, float)
+    for k, seen in enumerate(capture.seen_theta.T):
+        if not seen.any():
+            raise ValueError(f"joint {k} was seen in no frame.")
+        gaps = np.clip(capture.time[~seen], capture.time[seen][0], capture.time[seen][-1])
+        if seen.sum() > 1:
+            theta[~seen, k] = PchipInterpolator(capture.time[seen], theta[seen, k])(gaps)
+        theta[~seen, k] = theta[~seen, k] if seen.sum() > 1 else theta[seen, k][0]
+    return theta
+
+
+def compare(
+    robot: Robot, capture: Capture, motion: Simulated | None = None, *, offset: float | None = None
+) -> Comparison:
+    """Compare a capture with a simulated motion, or with what follows from its own joint angles.
+
+    Args:
+        robot: the robot.
+        capture: what was measured.
+        motion: what was planned, such as a `Motion`; default the measured joint motion with the orientation that
+            the momentum equation gives for it (`joints_simulated`).
+        offset: time of the capture at which the motion starts [s]; default the one at which joint angles (for a
+            planned motion) or else orientations fit best.
+
+    Raises:
+        ValueError: if capture and robot or motion do not fit together, or there is nothing to compare.
+    """
+    _check_joints(robot, capture)
+    if motion is None:
+        if not capture.seen_rotation.any():
+            raise ValueError("the capture has no orientation, and no motion is given: there is nothing to compare.")
+        simulated = joints_simulated(robot, capture)
+        capture = capture._replace(theta=None)
+    else:
+        simulated = Sampled(*(np.asarray(x, float) for x in (motion.time, motion.theta, motion.rotation)))
+        if simulated.theta.shape[1] != robot.joints:
+            raise ValueError(f"`motion` has {simulated.theta.shape[1]} joints; {robot.name!r} has {robot.joints}.")
+    found = False
+    if offset is None:
+        offset, found = align(capture, simulated)
+    elif not np.isfinite(offset):
+        raise ValueError(f"`offset` is {offset}; it must be a finite time in seconds.")
+    return _compared(capture, simulated, float(offset), found)
+
+
+def align(capture: Capture, motion: Simulated) -> tuple[float, bool]:
+    """Time of the capture [s] at which the motion's clock is zero, by least squares.
+
+    Of the joint angles if they were measured, else of the orientation, whose frame is then free. All shifts by which
+    motion and capture overlap are tried, 200 to a duration of the motion; the best is refined without regard to frames.
+
+    Returns:
+        The time, and whether it is a minimum inside the range of shifts (not its edge, nor a capture at rest).
+
+    Raises:
+        ValueError: if the capture is more than 100 times as long as the motion.
+    """
+    from scipy.optimize import minimize_scalar
+
+    cost = _joint_cost(capture, motion) if capture.theta is not None else _turn_cost(capture, motion)
+    first, last = float(motion.time[0]), float(motion.time[-1])
+    low, high = capture.time[0] - last, capture.time[-1] - first
+    if high - low > (_LONGEST + 1) * (last - first):
+        raise ValueError(
+            f"the capture lasts {np.ptp(capture.time):.4g} s and the motion {last - first:.4g} s; "
+            f"cut the capture to the part around the motion, or give `offset`."
+        )
+    shifts = np.linspace(low, high, 1 + int(np.ceil((high - low) / (last - first) * _SHIFTS_PER_MOTION)))
+    costs = np.array([cost(shift) for shift in shifts])
+    best = int(np.argmin(costs))
+    around = (shifts[max(best - 1, 0)], shifts[min(best + 1, len(shifts) - 1)])
+    fine = minimize_scalar(cost, bounds=around, method="bounded", options={"xatol": 1e-9})
+    offset = float(fine.x if fine.fun <= costs[best] else shifts[best])
+    inside = 0 < best < len(shifts) - 1
+    return offset, bool(inside and costs[best] < 0.5 * max(costs[0], costs[-1]))
+
+
+def _check_joints(robot: Robot, capture: Capture) -> None:
+    if not isinstance(capture, Capture):
+        kind = type(capture).__name__
+        raise ValueError(f"`capture` is a {kind}; it must be a Capture, such as `read_capture` returns.")
+    if capture.theta is not None and capture.theta.shape[1] != robot.joints:
+        raise ValueError(f"the capture has {capture.theta.shape[1]} joints; {robot.name!r} has {robot.joints}.")
+
+
+def _joint_cost(capture: Capture, motion: Simulated) -> Callable[[float], float]:
+    seen = capture.seen_theta
+    measured = [(capture.time[s], np.asarray(capture.theta)[s, k], k) for k, s in enumerate(seen.T)]
+    joints = [np.asarray(motion.theta)[:, k] for k in range(seen.shape[1])]
+    count = max(1, seen.sum())
+
+    def cost(shift: float) -> float:
+        return sum(((np.interp(t - shift, motion.time, joints[k]) - x) ** 2).sum() for t, x, k in measured) / count
+
+    return cost
+
+
+def _turn_cost(capture: Capture, motion: Simulated) -> Callable[[float], float]:
+    seen = capture.seen_rotation
+    time, measured = capture.time[seen], np.asarray(capture.rotation)[seen]
+    at = interpolated(np.asarray(motion.time, float), np.asarray(motion.rotation, float))
+
+    def cost(shift: float) -> float:
+        """Mean of `1 - cos(angle)`, about half the square of the angle, with the best frame of the cameras."""
+        together = np.einsum("mab,mcb->ac", measured, at(time - shift)) / len(time)
+        u, s, v = np.linalg.svd(together)
+        return float(3 - s[0] - s[1] - s[2] * np.linalg.det(u @ v)) / 2
+
+    return cost
+
+
+def interpolated(time: np.ndarray, rotation: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """Orientation as a function of time, at rest before the first and after the last one."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    turn = Slerp(time, Rotation.from_matrix(rotation))
+    return lambda when: turn(np.clip(when, time[0], time[-1])).as_matrix()
+
+
+def _compared(capture: Capture, motion: Sampled, offset: float, found: bool) -> Comparison:
+    time = capture.time - offset
+    frames = len(time)
+    simulated = interpolated(motion.time, motion.rotation)(time)
+    start = motion.rotation[0]
+    simulated = start.T @ simulated
+    theta = np.stack([np.interp(time, motion.time, column) for column in motion.theta.T], axis=1)
+    seen = capture.seen_rotation
+    measured = np.full((frames, 3, 3), np.nan) if capture.rotation is None else np.array(capture.rotation)
+    measured[~seen] = np.nan
+    if seen.any():
+        measured = _frame(measured[seen], simulated[seen]).T @ measured
+    zxz, angles = zxz_without_jumps(simulated), tilt_and_roll(simulated)
+    measured_angles = np.full((frames, 3), np.nan)
+    if seen.any():
+        measured_angles[seen] = tilt_and_roll(measured[seen])
+        turns = np.round(np.nanmedian(measured_angles[:, 2] - angles[:, 2]) / (2 * np.pi))
+        measured_angles[:, 2] -= 2 * np.pi * turns
+    measured_zxz = zxz_beside(measured, zxz)
+    joints = np.full_like(theta, np.nan) if capture.theta is None else np.asarray(capture.theta)
+    between = 0.5 * (np.einsum("mab,mab->m", measured, simulated) - 1)
+    return Comparison(
+        offset=offset,
+        offset_found=found,
+        time=time,
+        measured_theta=joints,
+        simulated_theta=theta,
+        measured_rotation=measured,
+        simulated_rotation=simulated,
+        measured_zxz=measured_zxz,
+        simulated_zxz=zxz,
+        measured_tilt_roll=measured_angles,
+        simulated_tilt_roll=angles,
+        theta_rms=_rms(joints - theta),
+        zxz_rms=_rms(measured_zxz - zxz),
+        tilt_roll_rms=_rms(measured_angles - angles),
+        angle_rms=float(_rms(np.arccos(np.clip(between, -1, 1))[:, None])[0]),
+    )
+
+
+def _frame(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
+    """Turn from the robot's start to the cameras' frame: the mean over the first frames, before it has turned."""
+    turned = np.arccos(np.clip(0.5 * (np.trace(simulated[0].T @ simulated, axis1=1, axis2=2) - 1), -1, 1))
+    still = int(np.argmax(turned > _AT_REST)) or len(turned)
+    return align_frames(measured[:still], simulated[:still])
+
+
+def align_frames(measured: Float[np.ndarray, "m 3 3"], simulated: Float[np.ndarray, "m 3 3"]) -> np.ndarray:
+    """Rotation `G` for which `measured = G simulated` fits best, by least squares of the matrices."""
+    u, _, v = np.linalg.svd(np.einsum("mab,mcb->ac", measured, simulated))
+    return u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v
+
+
+def _rms(differences: np.ndarray) -> np.ndarray:
+    """Of each column, over what is there; NaN where nothing is."""
+    seen = np.isfinite(differences)
+    total = np.where(seen, differences, 0.0)
+    with np.errstate(invalid="ignore"):
+        return np.sqrt((total**2).sum(axis=0) / seen.sum(axis=0))

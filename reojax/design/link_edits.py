@@ -1,0 +1,112 @@
+"""Changes of a robot's links that keep every link a possible rigid body; arguments may be traced.
+
+A body's second moments of mass `P = tr(I)/2 - I` (about its centre) are positive semidefinite. Stretching the body by a
+matrix S takes P to S P S^T, which still is, so that `I = tr(P) - P` belongs to a body again.
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike
+
+from reojax._internal.arrays import as_numbers, is_concrete
+from reojax.robot import Robot
+
+
+def with_mass(robot: Robot, link: int, mass: ArrayLike) -> Robot:
+    """Another mass [kg] of the same shape: the link's inertia is scaled with it.
+
+    Raises:
+        ValueError: if there is no such link, or `mass` is not one positive number.
+    """
+    index, wanted = _link(robot, link), _positive("mass", mass)
+    share = wanted / robot.mass[index]
+    return robot.replace(
+        mass=_put(robot.mass, index, wanted), inertia=_put(robot.inertia, index, share * robot.inertia[index])
+    )
+
+
+def with_com_offset(robot: Robot, link: int, offset: ArrayLike) -> Robot:
+    """Centre of mass moved by `offset` (3,) [m] in the link's frame, the inertia about it as before.
+
+    Raises:
+        ValueError: if there is no such link, or `offset` is not of shape (3,).
+    """
+    index, move = _link(robot, link), as_numbers("offset", offset)
+    if move.shape != (3,):
+        raise ValueError(f"`offset` has shape {move.shape}; it must be (3,), in m.")
+    return robot.replace(com=_put(robot.com, index, robot.com[index] + move))
+
+
+def with_length(robot: Robot, link: int, factor: ArrayLike, *, along: ArrayLike | None = None) -> Robot:
+    """The link stretched by `factor` from its frame's origin, mass kept: its shape, and the joints that it carries.
+
+    Args:
+        robot: the robot.
+        link: index of the link.
+        factor: new length over old.
+        along: (3,) direction of the stretch in the link's frame; default every direction.
+
+    Raises:
+        ValueError: if there is no such link, `factor` is not one positive number, or `along` is no direction.
+    """
+    index, scale = _link(robot, link), _positive("factor", factor)
+    share = np.eye(3)
+    if along is not None:
+        direction = np.asarray(as_numbers("along", along), float)
+        if direction.shape != (3,) or not direction.any() or not np.isfinite(direction).all():
+            raise ValueError(f"`along` is {along!r}; it must be (3,), finite and not zero.")
+        share = np.outer(direction, direction) / (direction @ direction)
+    stretch = jnp.eye(3, dtype=jnp.result_type(scale)) + (scale - 1) * share
+    robot = _stretched(robot, index, stretch, jnp.zeros(3, stretch.dtype))
+    carried = np.array([parent == index for parent in robot.parent])[:, None]
+    return robot.replace(anchor=jnp.where(carried, robot.anchor @ stretch, robot.anchor))
+
+
+def with_joint_inertia(robot: Robot, joint: int, inertia: ArrayLike) -> Robot:
+    """The link that a joint carries with another inertia about that joint's axis [kg m^2], mass and heights kept.
+
+    All its mass is moved straight towards or away from the axis by one factor, as in `robots.with_end_inertia`.
+
+    Raises:
+        ValueError: if there is no such joint, or `inertia` is not one positive number.
+    """
+    if isinstance(joint, bool) or not isinstance(joint, int | np.integer) or not 0 <= joint < robot.joints:
+        raise ValueError(f"`joint` is {joint!r}; {robot.name!r} has joints 0 to {robot.joints - 1}.")
+    wanted, link = _positive("inertia", inertia), joint + 1
+    axis, com = robot.axis[joint], robot.com[link]
+    along = axis[:, None] * axis[None, :]
+    across = np.eye(3, dtype=along.dtype) - along
+    present = (along * robot.inertia[link]).sum() + robot.mass[link] * (com @ across @ com)
+    return _stretched(robot, link, jnp.sqrt(wanted / present) * across + along, jnp.zeros_like(com))
+
+
+def _stretched(robot: Robot, link: int, stretch: jax.Array, fixed: jax.Array) -> Robot:
+    """Stretch a link's body about the point `fixed`."""
+    inertia = robot.inertia[link]
+    spread = 0.5 * jnp.trace(jnp.asarray(inertia)) * jnp.eye(3, dtype=inertia.dtype) - inertia
+    spread = stretch @ spread @ stretch.T
+    after = jnp.trace(spread) * jnp.eye(3, dtype=spread.dtype) - spread
+    return robot.replace(
+        com=_put(robot.com, link, fixed + stretch @ (robot.com[link] - fixed)),
+        inertia=_put(robot.inertia, link, after),
+    )
+
+
+def _put(array: Any, index: int, value: Any) -> jax.Array:
+    return jnp.asarray(array).at[index].set(value)
+
+
+def _link(robot: Robot, link: int) -> int:
+    if isinstance(link, bool) or not isinstance(link, int | np.integer) or not 0 <= link < robot.links:
+        raise ValueError(f"`link` is {link!r}; {robot.name!r} has links 0 to {robot.links - 1}.")
+    return int(link)
+
+
+def _positive(entry: str, value: ArrayLike) -> Any:
+    number = as_numbers(entry, value)
+    if number.shape or (is_concrete(number) and not 0 < number < np.inf):
+        raise ValueError(f"`{entry}` is {value!r}; it must be one positive, finite number.")
+    return number

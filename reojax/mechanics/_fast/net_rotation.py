@@ -1,0 +1,212 @@
+"""Rotation of the base after a polygon, with its derivative.
+
+The derivative of the end rotation is a sum over the path: a change `d omega(s)` of the angular velocity turns
+the end by `R(s) d omega(s)` seen from the start, so `dR R^T = hat(integral of R d omega)`. And since
+`L(theta, theta_dot, omega) = 0` along the path, `d omega = -A^-1 dL` with `dL` the change of the angular momentum
+at a fixed motion of the base: nothing of the inverse has to be differentiated. The linear momentum of that fixed
+motion being zero, its reference point and velocity may stay fixed too (their first-order effects cancel).
+The sum uses the nodes and values of the solution itself. Forward mode (`_push`) takes `dL` from `momentum`.
+Reverse mode (`_pull`) is the transpose: one constant vector `l` turned into each node's frame, `mu = -A^-1 R^T l`, and
+the derivative of `mu . L` in closed form (`virtual`). Both compute the values at the nodes again, block by block
+(`blocks`): keeping them from the first pass would take as long, and memory for all designs. What they are by are the
+`Parameters` of `components`; from there to the arrays of a robot JAX differentiates as usual.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax.custom_derivatives import SymbolicZero
+
+from reojax.mechanics._fast.blocking import Call, in_blocks
+from reojax.mechanics._fast.magnus import Step, mean_over_step, step_rotations
+from reojax.mechanics._fast.materialize import keep
+from reojax.mechanics._fast.momentum_jvp import angular_momentum
+from reojax.mechanics._fast.momentum_vjp import slopes, together
+from reojax.mechanics._fast.nodes import NODES, path_nodes, sum_over_nodes, to_nodes, to_points
+from reojax.mechanics._fast.parameters import (
+    Components,
+    Known,
+    Parameters,
+    Pattern,
+    components,
+    flattened,
+    known_parameters,
+    parameters,
+    split,
+)
+from reojax.mechanics._fast.quaternions import (
+    Quaternion,
+    Triple,
+    conjugate,
+    product,
+    products_up_to,
+    rotate,
+    shifted,
+    times,
+    to_matrix,
+)
+from reojax.mechanics._fast.recursion import AT_ONCE, inward, solve
+from reojax.mechanics._fast.scalar import Symmetric, Vector, cross, plus, times as scale
+from reojax.mechanics._fast.sincos import sincos
+from reojax.robot import Robot
+
+
+class Problem(NamedTuple):
+    """What is known while tracing."""
+
+    steps: int
+    parent: tuple[int, ...]
+    known: Known
+    varied: tuple[bool, ...] = ()
+    """Which of the flattened parameters a derivative is by; the known ones among them do not change."""
+    moved: bool = False
+    """Whether it is by the path too."""
+
+    def robot(self, data: Sequence[jax.Array]) -> Components:
+        """Put the known numbers in the place of the data."""
+        return components([x if k is None else k for x, k in zip(data, self.known, strict=True)], self.parent)
+
+
+def steps_of_path(robot: Robot, pattern: Pattern, points: jax.Array, steps: int) -> Step:
+    """Rotation over each of the `steps` steps of each edge, in order."""
+    problem = Problem(steps, robot.parent, known_parameters(robot, pattern))
+    return _steps_of_path(problem, flattened(parameters(robot)), points)
+
+
+def end_rotation(robot: Robot, pattern: Pattern, points: jax.Array, steps: int) -> jax.Array:
+    """Rotation (3, 3) after the polygon `points` (v, j), v >= 2; all arrays of one dtype."""
+    problem = Problem(steps, robot.parent, known_parameters(robot, pattern))
+    return _end_rotation(problem, parameters(robot), points)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
+def _end_rotation(problem: Problem, numbers: Parameters, points: jax.Array) -> jax.Array:
+    alive = 1 if points.shape[1] <= AT_ONCE else 4
+    call = Call(_rotation, problem, ((3, 3),), alive * _nodes(problem, points))
+    return in_blocks(call, flattened(numbers), points)[0]
+
+
+@partial(_end_rotation.defjvp, symbolic_zeros=True)
+def _end_rotation_jvp(problem, primals, tangents):
+    rotation = _end_rotation(problem, *primals)
+    numbers, points = primals
+    by_numbers, by_points = tangents
+    varied = [change for change in by_numbers if not isinstance(change, SymbolicZero)]
+    problem = problem._replace(
+        varied=tuple(not isinstance(c, SymbolicZero) for c in by_numbers for _ in range(c.size)),
+        moved=not isinstance(by_points, SymbolicZero),
+    )
+    changes = ([flattened(varied)] if varied else []) + [by_points] * problem.moved
+    if not changes:
+        return rotation, jnp.zeros_like(rotation)
+    alive = max(4, points.shape[1])
+    call = Call(_push, problem, ((3,),), alive * _nodes(problem, points), transpose=_pull, linear=len(changes))
+    turn = in_blocks(call, flattened(numbers), points, *changes)[0]
+    return rotation, jnp.cross(turn[:, None], rotation, axis=0)
+
+
+def _nodes(problem: Problem, points: jax.Array) -> int:
+    """Size of a value at all nodes. (Blocks are smaller the more of them are `alive` at once, as measured.)"""
+    return (points.shape[0] - 1) * problem.steps * len(NODES)
+
+
+def _rotation(problem: Problem, numbers: jax.Array, points: jax.Array) -> list[jax.Array]:
+    return [to_matrix(product(_steps_of_path(problem, numbers, points).rotation))]
+
+
+def _steps_of_path(problem: Problem, numbers: jax.Array, points: jax.Array) -> Step:
+    theta, rate = path_nodes(points, problem.steps)
+    base = inward(problem.robot(split(numbers)), [sincos(a) for a in theta], rate)
+    return step_rotations(keep(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0])))
+
+
+class Solution(NamedTuple):
+    """What derivatives read of the solution, kept."""
+
+    theta: list[jax.Array]
+    rate: list[jax.Array]
+    sine_cosine: list[Any]
+    inertia: Symmetric
+    """`A`."""
+    centre: Vector
+    omega: Triple
+    velocity: Any
+    """Of the base's origin, the centre of mass being at rest."""
+    step: Step
+    to_step: Quaternion
+    """Attitude in which `step.inside` begins, from the start of the path, four arrays (steps,)."""
+
+
+def _solution(problem: Problem, data: list[jax.Array], points: jax.Array) -> Solution:
+    theta, rate = path_nodes(points, problem.steps)
+    sine_cosine = [keep(sincos(angle)) for angle in theta]
+    robot = problem.robot(data)
+    base = inward(robot, sine_cosine, rate, by_joint=not robot.axes_known)
+    moving = keep((*base.momentum, *base.drift))
+    centre, drift = keep(base.centre), moving[3:]
+    inertia = keep(base.inertia)
+    omega = keep(_at_nodes(solve(inertia, scale(-1, moving[:3])), theta[0]))
+    velocity = keep(scale(-1, plus(drift, cross(omega, centre))))
+    step = step_rotations(omega)
+    to_step = keep(times(shifted(products_up_to(step.rotation), 1), step.half))
+    return Solution(theta, rate, sine_cosine, inertia, centre, omega, velocity, step, to_step)
+
+
+def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax.Array) -> list[jax.Array]:
+    """How the end turns, seen from the start, with changes of the data and of the path."""
+    data = split(numbers)
+    known = _solution(problem, data, points)
+    like = known.theta[0]
+    places = [i for i, varied in enumerate(problem.varied) if varied]
+
+    def momentum(varied, points):
+        now = [to_nodes(value, like) for value in data]
+        for i, value in zip(places, varied, strict=True):
+            now[i] = to_nodes(value, like)
+        theta, rate = path_nodes(points, problem.steps)
+        fixed = (known.omega, known.velocity, known.centre)
+        return _at_nodes(angular_momentum(problem.robot(now), [sincos(a) for a in theta], rate, *fixed), like)
+
+    given = iter(changes)
+    by_data = split(next(given)) if places else []
+    by_points = next(given) if problem.moved else jnp.zeros_like(points)
+    _, change = jax.jvp(momentum, ([data[i] for i in places], points), (by_data, by_points))
+    change_of_omega = keep(_at_nodes(solve(known.inertia, scale(-1, change)), like))
+    in_step = keep(mean_over_step(known.step.inside(change_of_omega)))
+    x, y, z = (c.sum() for c in rotate(known.to_step, in_step))
+    return [jnp.stack([x, y, z])]
+
+
+def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.Array) -> list[jax.Array]:
+    """Transpose of `_push`: what the scalar product of `by_turn` with the end's turn changes by."""
+    data = split(numbers)
+    robot = problem.robot(data)
+    known = _solution(problem, data, points)
+    like = known.theta[0]
+    in_step = keep(rotate(conjugate(known.to_step), tuple(split(by_turn))))
+    by_omega = known.step.back(in_step)
+    mu = keep(_at_nodes(solve(known.inertia, scale(-1, by_omega)), like))
+    of = slopes(robot, known.sine_cosine, known.rate, known.omega, known.velocity, known.centre, mu)
+    found = []
+    if any(problem.varied):
+        by_entry, loops = jax.tree.leaves(of.robot), jax.tree.leaves(together(robot))
+        unknown = [i for i, varied in enumerate(problem.varied) if varied and problem.known[i] is None]
+        sums: dict[int, jax.Array] = {}
+        for loop in dict.fromkeys(loops[i] for i in unknown):
+            places = [i for i in unknown if loops[i] == loop]
+            values = _at_nodes([by_entry[i] for i in places], like)
+            sums |= zip(places, sum_over_nodes(values), strict=True)
+        zero = jnp.zeros((), like.dtype)
+        found.append(jnp.stack([sums.get(i, zero) for i, varied in enumerate(problem.varied) if varied]))
+    if problem.moved:
+        by_nodes = [keep(_at_nodes(of_joint, like)) for of_joint in zip(of.theta, of.rate, strict=True)]
+        by_theta, by_rate = ([pair[i] for pair in by_nodes] for i in (0, 1))
+        found.append(to_points(by_theta, by_rate, problem.steps))
+    return found
+
+
+def _at_nodes(vector, like: jax.Array) -> Triple:
+    return tuple(jnp.broadcast_to(jnp.asarray(c, like.dtype), like.shape) for c in vector)

@@ -1,0 +1,108 @@
+"""Angular momentum of a free-floating robot: `A(theta) omega = B(theta) theta_dot` (thesis eq. 2.14).
+
+With zero momentum, angular velocity `omega` of the base and joint rates `theta_dot` are tied by the
+*local connection* `A^-1 B`, which depends on the shape `theta` alone. This module is the definition,
+written to be read; `reojax.mechanics._fast` evaluates the same equations quickly and is tested against it.
+
+Notation (thesis 1.5, 2.5), all in the base frame: `rotation[i]`, `centre[i]` are link i's orientation
+and its centre of mass measured from the centre of mass of the whole robot; `turn[i]` (3, j) and
+`shift[i]` (3, j) are its angular and linear Jacobians, `w_i = omega + turn[i] theta_dot` and
+`v_i = omega x centre[i] + shift[i] theta_dot`. The momentum about the centre of mass is
+
+    h = sum_i I_i w_i + m_i centre_i x v_i + sum_k J_k (+-N_k theta_dot_k) e_k  =  A omega - B theta_dot,
+
+the last sum over the motors' rotors, which spin about their joints' axes `e_k` relative to the
+links that carry them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from reojax._internal.arrays import Array
+from reojax._internal.linalg import solve_symmetric3
+from reojax.mechanics.kinematics import Kinematics, checked, kinematics
+from reojax.robot import Robot
+from reojax.so3 import hat
+
+
+class MomentumMatrices(NamedTuple):
+    """`A` and `B` of `A omega = B theta_dot`, base frame, about the centre of mass [kg m^2]."""
+
+    A: Float[Array, "3 3"]
+    """Locked inertia of the robot; symmetric, positive definite."""
+    B: Float[Array, "3 j"]
+    """Minus the momentum that unit joint rates give while the base does not turn."""
+
+
+def momentum_matrices(robot: Robot, theta: Float[Array, " j"]) -> MomentumMatrices:
+    """Matrices of `A omega = B theta_dot` at zero angular momentum (thesis eq. 2.14).
+
+    Args:
+        robot: the robot.
+        theta: (j,) joint angles [rad].
+
+    Returns:
+        `A` (3, 3) and `B` (3, j) [kg m^2], in the base frame, about the centre of mass.
+
+    Raises:
+        ValueError: if `theta` has the wrong shape or is not finite.
+    """
+    robot, theta = checked(robot, theta=theta)
+    return momentum_matrices_of_pose(robot, kinematics(robot, theta))
+
+
+def momentum_matrices_of_pose(robot: Robot, pose: Kinematics) -> MomentumMatrices:
+    """`momentum_matrices` where the poses and Jacobians are known already."""
+    inertia = inertia_in_base_frame(robot, pose)
+    lever = jax.vmap(hat)(pose.centre)
+    A = (inertia - jnp.einsum("i,iab,ibc->iac", robot.mass, lever, lever)).sum(0)
+    B = -jnp.einsum("iab,ibk->ak", inertia, pose.turn) - jnp.einsum("i,iab,ibk->ak", robot.mass, lever, pose.shift)
+    return MomentumMatrices(A, B - pose.axis.T * (robot.rotor_inertia * rotor_spin(robot))[None])
+
+
+def inertia_in_base_frame(robot: Robot, pose: Kinematics) -> Float[Array, "n 3 3"]:
+    """Inertia of each link about its centre of mass, in the base frame [kg m^2]."""
+    symmetric = 0.5 * (robot.inertia + robot.inertia.swapaxes(1, 2))
+    return jnp.einsum("iab,ibc,idc->iad", pose.rotation, symmetric, pose.rotation)
+
+
+def rotor_spin(robot: Robot) -> Float[Array, " j"]:
+    """Turns of each rotor about its joint's axis, relative to the stator's link, per turn of the joint."""
+    return robot.gear_ratio * np.array([1 if side == "parent" else -1 for side in robot.rotor_on], int)
+
+
+def connection(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "3 j"]:
+    """Local connection `A^-1 B`: column k is the base's turn per turn of joint k, base frame.
+
+    `omega = connection(robot, theta) @ theta_dot` at zero angular momentum (thesis 2.5).
+
+    Raises:
+        ValueError: if `theta` has the wrong shape or is not finite.
+    """
+    A, B = momentum_matrices(robot, theta)
+    return solve_symmetric3(A, B)
+
+
+def angular_momentum(
+    robot: Robot, theta: Float[Array, " j"], theta_dot: Float[Array, " j"], omega: Float[Array, "3"]
+) -> Float[Array, "3"]:
+    """Total angular momentum `A omega - B theta_dot` about the centre of mass, base frame [kg m^2/s].
+
+    Args:
+        robot: the robot.
+        theta: (j,) joint angles [rad].
+        theta_dot: (j,) joint rates [rad/s].
+        omega: (3,) angular velocity of the base, base frame [rad/s].
+
+    Raises:
+        ValueError: if an argument has the wrong shape or is not finite.
+    """
+    robot, theta, theta_dot, omega = checked(robot, theta=theta, theta_dot=theta_dot, omega=omega)
+    A, B = momentum_matrices(robot, theta)
+    return A @ omega - B @ theta_dot

@@ -1,0 +1,1 @@
+"""Motions in time: time laws, motors, simulation, least time, control, imperfect releases."""

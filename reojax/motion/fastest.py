@@ -1,0 +1,187 @@
+"""The fastest motions the motors allow for a net rotation: free time laws, overlapped edges, free paths (thesis 1.8).
+
+`minimum_time` runs a given path by a given law. Here law and path give way: the duration is minimised by gradients,
+with every motor within its torque-speed curve and every joint within its limits at the samples, and the net rotation
+held where it is wanted. Answers are local optima near their starts.
+"""
+
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike
+
+from reojax._internal.arrays import Array, as_numbers
+from reojax.mechanics.holonomy import net_rotation
+from reojax.motion._optimal_control import Box, Fastest as Fastest, Task, least_duration
+from reojax.motion.least_time import minimum_time
+from reojax.motion.motor import Motor, check_motors
+from reojax.motion.time_laws import Law, quintic, trapezoid
+from reojax.motion.trajectory import Trajectory, along, overlapped, through
+from reojax.path import Path
+from reojax.robot import Robot
+
+
+def overlap(
+    robot: Robot,
+    path: Path,
+    motors: Motor | Sequence[Motor],
+    law: Law | None = None,
+    *,
+    max_steps: int = 100,
+    progress: str | None = None,
+) -> Fastest:
+    """Run a path with its edges overlapped: each joint's move in each edge gets a time of its own.
+
+    Corners become smooth, which changes the net rotation; so the joints' amplitudes change too, each joint by one
+    factor, such that the net rotation of `path` is kept.
+
+    Args:
+        robot: the robot; its rotor inertias and gear ratios hold, and its limits.
+        path: the path in shape space, with numbers that can be read: not under `jit`.
+        motors: motors of the joints, one for all or one for each.
+        law: the time law of every move; default `quintic()`.
+        max_steps: most steps of the optimiser.
+        progress: what to write before a bar on stderr; default no bar.
+
+    Raises:
+        ValueError: as `minimum_time`.
+    """
+    law = quintic() if law is None else law
+    least = minimum_time(robot, path, motors, law)
+    corners = np.asarray(path.waypoints, float)
+    moves = tuple((int(e), int(k)) for e, k in np.argwhere(np.diff(corners, axis=0) != 0))
+    edge = np.array(moves)[:, 0]
+    durations = np.asarray(least.durations, float)
+    total = float(durations.sum())
+    start = np.concatenate([[0.0], np.cumsum(durations)])[edge]
+    count = len(moves)
+    follows = [(a, b) for a in range(count) for b in range(a + 1, count) if moves[a][1] == moves[b][1]]
+    follows = np.array([(a, b) for a, b in follows if not any((a, c) in follows for c in range(a + 1, b))], int)
+    follows = follows.reshape(-1, 2)
+
+    def build(x: Array) -> Trajectory:
+        share = x[2 * count : -1]
+        return overlapped(jnp.asarray(corners) * share[None], law, x[:count], x[count : 2 * count], moves)
+
+    def order(x: Array) -> Array:
+        begin, end = x[:count], x[:count] + x[count : 2 * count]
+        return jnp.concatenate([end - x[-1], end[follows[:, 0]] - begin[follows[:, 1]]])
+
+    joints = robot.joints
+    first = np.concatenate([start, durations[edge], np.ones(joints), [total]])
+    low = np.concatenate([np.zeros(count), np.full(count, 0.05 * total / path.edges), np.full(joints + 1, 0.2)])
+    high = np.concatenate([np.full(2 * count, 1.5 * total), np.full(joints, 2.0), [1.5 * total]])
+    low[-1] = 0.2 * total
+    scale = np.concatenate([np.full(2 * count, 0.2 * total), np.full(joints, 0.3), [total]])
+    goal = net_rotation(robot, path)
+    task = Task(robot, check_motors(motors, robot), goal, False, build, lambda x: x[-1], order)
+    return least_duration(task, first[None], Box(low, high, scale), max_steps, progress)
+
+
+def free_law(
+    robot: Robot,
+    path: Path,
+    motors: Motor | Sequence[Motor],
+    *,
+    points: int = 5,
+    max_steps: int = 100,
+    progress: str | None = None,
+) -> Fastest:
+    """Run a path, corners and all, by the fastest time law of each edge: a spline through `points` free points.
+
+    Arguments and errors as for `overlap`; the path and so the net rotation stay.
+    """
+    least = minimum_time(robot, path, motors, trapezoid())
+    edges = path.edges
+    corners = np.asarray(path.waypoints, float)
+    law = trapezoid()
+    place = np.array([_value(law, u) for u in np.arange(1, points + 1) / (points + 1)])
+
+    def build(x: Array) -> Trajectory:
+        inner = jnp.concatenate([jnp.zeros((edges, 1)), x[edges:].reshape(edges, points), jnp.ones((edges, 1))], 1)
+        parts = [
+            through(Path(corners[e] + inner[e][:, None] * (corners[e + 1] - corners[e])[None]), x[e] / (points + 1))
+            for e in range(edges)
+        ]
+        return joined(parts)
+
+    durations = 1.2 * np.asarray(least.durations, float)
+    first = np.concatenate([durations, np.tile(place, edges)])
+    low = np.concatenate([0.2 * durations, np.full(edges * points, -0.2)])
+    high = np.concatenate([3 * durations, np.full(edges * points, 1.2)])
+    scale = np.concatenate([0.5 * durations, np.full(edges * points, 0.3)])
+    cost = lambda x: x[:edges].sum()
+    task = Task(robot, check_motors(motors, robot), net_rotation(robot, path), True, build, cost, lambda x: x[:0])
+    return least_duration(task, first[None], Box(low, high, scale), max_steps, progress)
+
+
+def fastest_loop(
+    robot: Robot,
+    target: ArrayLike,
+    motors: Motor | Sequence[Motor],
+    near: Path,
+    *,
+    knots: int = 10,
+    starts: int = 3,
+    seed: int = 0,
+    max_steps: int = 200,
+    progress: str | None = None,
+) -> Fastest:
+    """The fastest closed motion with a given net rotation: a spline of free knots at free times, at rest at both ends.
+
+    Args:
+        robot: the robot; its rotor inertias and gear ratios hold, and its limits.
+        target: (3, 3) the net rotation wanted.
+        motors: motors of the joints, one for all or one for each.
+        near: a closed path to start from; the first start is it, the others are strewn around it.
+        knots: intervals of the spline, 3 or more.
+        starts: how many starts.
+        seed: seed of the starts.
+        max_steps: most steps of the optimiser.
+        progress: what to write before a bar on stderr; default no bar.
+
+    Raises:
+        ValueError: as `minimum_time`, and for a target that is no rotation.
+    """
+    goal = _rotation(target)
+    motors = check_motors(motors, robot)
+    least = minimum_time(robot, near, motors)
+    law, joints = quintic(), robot.joints
+    begun = along(near, law, np.asarray(least.durations))
+    total = 1.2 * float(least.duration)
+    places = np.array([np.asarray(begun.at(t).theta) for t in np.linspace(0, float(least.duration), knots + 1)])
+    ends = jnp.asarray(places[[0]])
+
+    def build(x: Array) -> Trajectory:
+        inner = x[knots:].reshape(knots - 1, joints)
+        return through(Path(jnp.concatenate([ends, inner, ends])), x[:knots])
+
+    rng = np.random.default_rng(seed)
+    reach = np.minimum(np.asarray(robot.upper), np.pi) - np.maximum(np.asarray(robot.lower), -np.pi)
+    first = np.tile(np.concatenate([np.full(knots, total / knots), places[1:-1].ravel()]), (starts, 1))
+    first[1:, knots:] += 0.05 * rng.normal(size=(starts - 1, first.shape[1] - knots)) * np.tile(reach, knots - 1)
+    low = np.concatenate([np.full(knots, 0.1 * total / knots), np.tile(np.asarray(robot.lower, float), knots - 1)])
+    high = np.concatenate([np.full(knots, 3 * total / knots), np.tile(np.asarray(robot.upper, float), knots - 1)])
+    scale = np.concatenate([np.full(knots, total / knots), np.tile(0.3 * reach, knots - 1)])
+    task = Task(robot, motors, goal, False, build, lambda x: x[:knots].sum(), lambda x: x[:0])
+    return least_duration(task, np.clip(first, low, high), Box(low, high, scale), max_steps, progress)
+
+
+def joined(parts: Sequence[Trajectory]) -> Trajectory:
+    """One trajectory after the other; each must begin where the one before it ends."""
+    begin = jnp.cumsum(jnp.stack([jnp.zeros_like(parts[0].duration), *(part.duration for part in parts)]))
+    breaks = [part.breaks[:-1] + start for part, start in zip(parts, begin[:-1], strict=True)]
+    return Trajectory(jnp.concatenate([*breaks, begin[-1:]]), jnp.concatenate([part.coefficients for part in parts]))
+
+
+def _value(law: Law, u: float) -> float:
+    piece = int(np.clip((np.asarray(law.breaks) <= u).sum() - 1, 0, len(law.coefficients) - 1))
+    return float(np.polyval(np.asarray(law.coefficients)[piece][::-1], u - np.asarray(law.breaks)[piece]))
+
+
+def _rotation(target: ArrayLike) -> Array:
+    matrix = np.asarray(as_numbers("target", target), float)
+    if matrix.shape != (3, 3) or not np.allclose(matrix.T @ matrix, np.eye(3), atol=1e-6) or np.linalg.det(matrix) < 0:
+        raise ValueError(f"`target` is {matrix.tolist()}; it must be a rotation matrix (3, 3).")
+    return jnp.asarray(matrix)

@@ -1,0 +1,253 @@
+"""What an imperfect release does: leftover angular momentum, and a wire that pulls, along a given joint motion.
+
+With the total angular momentum `H` about the centre of mass in inertial components, the base turns by
+
+    R' = R hat(A^-1 (B theta_dot + R^T H)),      H' = (R r) x F - c R omega,
+
+`r` from the centre of mass to where a wire is tied to the base. The wire pulls with a constant force `F` (its weight,
+or the air that it catches) and resists turning with a moment `c` per angular velocity of the base. With neither wire
+nor momentum this is thesis eq. 2.14, and time does not matter; with them it does.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from reojax import so3
+from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
+from reojax._internal.linalg import solve_symmetric3
+from reojax.mechanics.kinematics import kinematics
+from reojax.mechanics.momentum import momentum_matrices
+from reojax.motion.trajectory import Trajectory, polynomial
+from reojax.robot import Robot
+
+DEFAULT_STEPS = 32
+"""Steps of each piece of a trajectory; fourth order."""
+
+
+class Release(NamedTuple):
+    """How a robot is let go; or, as standard deviations, how surely."""
+
+    momentum: ArrayLike = (0.0, 0.0, 0.0)
+    """(3,) angular momentum about the centre of mass at the start, inertial frame [kg m^2/s]."""
+    pull: ArrayLike = (0.0, 0.0, 0.0)
+    """(3,) force of the wire on the base, constant in the inertial frame [N]."""
+    tied: ArrayLike = (0.0, 0.0, 0.0)
+    """(3,) where the wire is tied, in the base frame [m]."""
+    drag: ArrayLike = 0.0
+    """Moment of the wire against the base's turning [N m s/rad]."""
+
+
+class Released(NamedTuple):
+    """A motion after a release."""
+
+    time: Float[Array, " m"]
+    """Time [s], from 0."""
+    rotation: Float[Array, "m 3 3"]
+    """Orientation of the base; the first is the identity."""
+    momentum: Float[Array, "m 3"]
+    """Angular momentum about the centre of mass, inertial frame [kg m^2/s]."""
+
+
+class ReleaseSpread(NamedTuple):
+    """Net rotation after an uncertain release."""
+
+    rotation: Float[Array, "3 3"]
+    """Net rotation after the expected release."""
+    sensitivity: Float[Array, "3 10"]
+    """Derivative of the error `log(rotation^T R)` by momentum (3), pull (3), tied (3) and drag, in that order."""
+    covariance: Float[Array, "3 3"]
+    """Covariance of that error by the linear rule [rad^2]."""
+    angle_rms: Float[Array, ""]
+    """Root mean square of its angle by the linear rule [rad]."""
+    drawn: Float[Array, "n 3"]
+    """Errors of releases drawn at random [rad]."""
+    drawn_covariance: Float[Array, "3 3"]
+    """Their mean square products, about the expected release [rad^2]."""
+    drawn_angle_rms: Float[Array, ""]
+    """Root mean square of their angles [rad]."""
+
+
+def released(
+    robot: Robot, trajectory: Trajectory, release: Release | None = None, *, steps: int = DEFAULT_STEPS
+) -> Released:
+    """Orientation and momentum of a robot that does a joint motion after a release.
+
+    Args:
+        robot: the robot.
+        trajectory: its joints' motion, as `along` makes it from a path, a time law and durations.
+        release: how it is let go; default perfectly.
+        steps: steps of each piece of the trajectory, static; fourth order.
+
+    Raises:
+        ValueError: if anything does not fit the robot, or is not finite.
+    """
+    release = Release() if release is None else release
+    return _released(*_checked(robot, trajectory, release, steps), steps)
+
+
+def release_spread(
+    robot: Robot,
+    trajectory: Trajectory,
+    deviation: Release,
+    key: jax.Array,
+    *,
+    expected: Release | None = None,
+    draws: int = 256,
+    steps: int = DEFAULT_STEPS,
+) -> ReleaseSpread:
+    """Net rotation and how far an uncertain release spreads it, by derivatives and by draws.
+
+    All numbers of the release are taken as independent and normal.
+
+    Args:
+        robot: the robot.
+        trajectory: its joints' motion.
+        deviation: standard deviations of the numbers of the release.
+        key: a key of `jax.random`, for the draws.
+        expected: the release that is aimed at; default a perfect one.
+        draws: number of draws, static.
+        steps: steps of each piece of the trajectory, static.
+
+    Raises:
+        ValueError: if anything does not fit the robot, is not finite, or a deviation is negative.
+    """
+    if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < 1:
+        raise ValueError(f"`draws` is {draws!r}; it must be a positive integer.")
+    robot, trajectory, mean = _checked(robot, trajectory, Release() if expected is None else expected, steps)
+    *_, spread = _checked(robot, trajectory, deviation, steps)
+    if is_concrete(spread) and (np.asarray(spread) < 0).any():
+        raise ValueError(f"`deviation` is {deviation}; standard deviations must not be negative.")
+    return _spread(robot, trajectory, mean, spread, key, int(draws), int(steps))
+
+
+def _checked(robot: Robot, trajectory: Trajectory, release: Release, steps: int) -> tuple[Robot, Trajectory, Array]:
+    """Everything as arrays of one dtype, the release as one vector of ten."""
+    if not isinstance(robot, Robot):
+        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
+    if not isinstance(trajectory, Trajectory):
+        raise ValueError(f"`trajectory` is a {type(trajectory).__name__}; it must be a Trajectory, as `along` makes.")
+    if trajectory.joints != robot.joints:
+        raise ValueError(f"`trajectory` moves {trajectory.joints} joints; {robot.name!r} has {robot.joints}.")
+    if not isinstance(release, Release):
+        raise ValueError(f"`release` is a {type(release).__name__}; it must be a Release.")
+    if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:
+        raise ValueError(f"`steps` is {steps!r}; it must be a positive integer.")
+    numbers = {field: as_numbers(f"release.{field}", value) for field, value in release._asdict().items()}
+    for field, value in numbers.items():
+        shape = () if field == "drag" else (3,)
+        if value.shape != shape:
+            raise ValueError(f"release.{field} has shape {value.shape}; it must be {shape}.")
+        if is_concrete(value) and not np.isfinite(value).all():
+            raise ValueError(f"release.{field} is {np.asarray(value).tolist()}; it must be finite.")
+    dtype = common_float(robot, trajectory, *numbers.values())
+    vector = jnp.concatenate([jnp.asarray(value, dtype).reshape(-1) for value in numbers.values()])
+    robot, trajectory = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), (robot, trajectory))
+    return robot, trajectory, vector
+
+
+class _Node(NamedTuple):
+    """What the base's motion depends on at one time."""
+
+    own: Array
+    """(3,) angular velocity without momentum."""
+    mobility: Array
+    """(3, 3) angular velocity per momentum, both in the base frame."""
+    middle: Array
+    """(3,) centre of mass of the robot in the base frame [m]."""
+
+
+@partial(jax.jit, static_argnums=3)
+def _released(robot: Robot, trajectory: Trajectory, release: Array, steps: int) -> Released:
+    time, length, nodes = _nodes(robot, trajectory, steps)
+    return Released(time, *_integrated(length, nodes, release))
+
+
+@partial(jax.jit, static_argnums=(5, 6))
+def _spread(
+    robot: Robot, trajectory: Trajectory, mean: Array, deviation: Array, key: jax.Array, draws: int, steps: int
+) -> ReleaseSpread:
+    _, length, nodes = _nodes(robot, trajectory, steps)
+
+    def end(release: Array) -> Array:
+        return _integrated(length, nodes, release)[0][-1]
+
+    # one program for everything: the expected release by each of its numbers, and the draws by none
+    random = deviation[None] * jax.random.normal(key, (draws, mean.size), mean.dtype)
+    along = jnp.concatenate([jnp.eye(mean.size, dtype=mean.dtype), jnp.zeros_like(random)])
+    start = mean[None] + jnp.concatenate([jnp.zeros((mean.size, mean.size), mean.dtype), random])
+    ends, slopes = jax.vmap(lambda release, by: jax.jvp(end, (release,), (by,)))(start, along)
+    rotation = ends[0]
+    back = partial(jnp.matmul, rotation.T, precision="highest")
+    sensitivity = jax.vmap(lambda slope: so3.vee(back(slope)))(slopes[: mean.size]).T
+    scaled = sensitivity * deviation[None]
+    covariance = jnp.matmul(scaled, scaled.T, precision="highest")
+    drawn = jax.vmap(lambda turned: so3.log(back(turned)))(ends[mean.size :])
+    return ReleaseSpread(
+        rotation=rotation,
+        sensitivity=sensitivity,
+        covariance=covariance,
+        angle_rms=jnp.sqrt(jnp.trace(covariance)),
+        drawn=drawn,
+        drawn_covariance=jnp.matmul(drawn.T, drawn, precision="highest") / draws,
+        drawn_angle_rms=jnp.sqrt((drawn**2).sum(axis=1).mean()),
+    )
+
+
+def _nodes(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Array, _Node]:
+    """Times, lengths of all steps, and what counts at the start, the middle and the end of each."""
+    dtype = trajectory.breaks.dtype
+    piece = jnp.diff(trajectory.breaks)
+    share = (jnp.arange(steps, dtype=dtype)[:, None] + jnp.array([0, 0.5, 1], dtype)[None]) / steps
+    within = share[None] * piece[:, None, None]
+    state = jax.vmap(jax.vmap(jax.vmap(polynomial, (None, 0)), (None, 0)))(trajectory.coefficients, within)
+
+    def node(theta: Array, theta_dot: Array) -> _Node:
+        A, B = momentum_matrices(robot, theta)
+        columns = jnp.concatenate([(B @ theta_dot)[:, None], jnp.eye(3, dtype=dtype)], axis=1)
+        both = solve_symmetric3(A, columns)
+        return _Node(both[:, 0], both[:, 1:], robot.com[0] - kinematics(robot, theta).centre[0])
+
+    nodes = jax.vmap(node)(*(leaf.reshape(within.size, robot.joints) for leaf in (state.theta, state.theta_dot)))
+    count = trajectory.pieces * steps
+    length = jnp.repeat(piece / steps, steps)
+    time = jnp.append((trajectory.breaks[:-1, None] + within[:, :, 0]).ravel(), trajectory.breaks[-1])
+    return time, length, jax.tree.map(lambda leaf: leaf.reshape(count, 3, *leaf.shape[1:]), nodes)
+
+
+def _integrated(length: Array, nodes: _Node, release: Array) -> tuple[Array, Array]:
+    """Rotations (m, 3, 3) and momenta (m, 3): Runge-Kutta of order four on the rotation vector of each step."""
+    momentum, pull, tied, drag = release[:3], release[3:6], release[6:9], release[9]
+    still = jnp.zeros_like(momentum)
+    parts, weights = jnp.array([0, 0.5, 0.5, 1], momentum.dtype), jnp.array([1, 2, 2, 1], momentum.dtype) / 6
+    nodes = jax.tree.map(lambda leaf: leaf[:, np.array([0, 1, 1, 2])], nodes)
+
+    def step(state: tuple[Array, Array], inputs: tuple[Array, _Node]) -> tuple[tuple[Array, Array], tuple]:
+        start, momentum = state
+        h, node = inputs
+
+        def stage(carry: tuple, inputs: tuple[Array, Array, _Node]) -> tuple[tuple, None]:
+            turn_rate, moment, turn_sum, moment_sum = carry
+            part, weight, node = inputs
+            turn = h * part * turn_rate
+            rotation = jnp.matmul(start, so3.exp(turn), precision="highest")
+            omega = node.own + node.mobility @ (rotation.T @ (momentum + h * part * moment))
+            moment = jnp.cross(rotation @ (tied - node.middle), pull) - drag * (rotation @ omega)
+            twist = jnp.cross(turn, omega)
+            turn_rate = omega + twist / 2 + jnp.cross(turn, twist) / 12
+            return (turn_rate, moment, turn_sum + weight * turn_rate, moment_sum + weight * moment), None
+
+        (*_, turn, moment), _ = jax.lax.scan(stage, (still,) * 4, (parts, weights, node))  # one stage to compile
+        end = jnp.matmul(start, so3.exp(h * turn), precision="highest"), momentum + h * moment
+        return end, end
+
+    first = jnp.eye(3, dtype=momentum.dtype)
+    _, (rotations, momenta) = jax.lax.scan(step, (first, momentum), (length, nodes))
+    return jnp.concatenate([first[None], rotations]), jnp.concatenate([momentum[None], momenta])

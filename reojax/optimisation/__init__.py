@@ -1,0 +1,1 @@
+"""Constrained optimisation from many starts; it knows nothing of robots."""

@@ -1,0 +1,273 @@
+"""The command line: numbers that agree with the library, pictures whole or absent, one line for bad input."""
+
+import json
+import os
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from scipy.spatial.transform import Rotation
+
+import reojax
+from reojax import plot, robots, session, so3
+from reojax._internal import files
+from reojax.cli import main, simulate
+from reojax.mechanics.attitude import tilt_and_roll
+
+
+@pytest.fixture(autouse=True)
+def _no_cache(monkeypatch):
+    monkeypatch.setenv("REOJAX_CACHE", "0")
+
+
+def test_simulate_prints_what_the_library_computes(capsys, tmp_path):
+    """The default is manoeuvre A on the prototype at 270/120; every form of the rotation is the same one."""
+    out = tmp_path / "a.png"
+    assert main(["simulate", "--json", "--out", str(out)]) == 0
+    printed, complaint = capsys.readouterr()
+    report = json.loads(printed)
+    assert complaint == ""
+    assert report["config"]["robot"] == "prototype"
+    path = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
+    rotation = reojax.net_rotation(robots.prototype(), path)
+    for same in (
+        report["rotation_matrix"],
+        so3.exp(report["rotation_vector_rad"]),
+        so3.from_euler_zxz(report["euler_zxz_rad"]),
+        so3.from_quaternion(report["quaternion_wxyz"]),
+    ):
+        np.testing.assert_allclose(same, rotation, atol=1e-12)
+    for key in ("rotation_vector", "euler_zxz", "angle", "roll_along_path"):
+        np.testing.assert_allclose(report[f"{key}_deg"], np.rad2deg(report[f"{key}_rad"]), rtol=1e-14)
+    assert report["roll_along_path_deg"] - 360 == pytest.approx(report["rotation_vector_deg"][2], abs=2)
+    assert report["certificate"]["momentum_relative"] < 3e-11
+    assert report["certificate"]["orthogonality"] < 3e-14
+    assert report["certificate"]["halving_rad"] < 1e-9
+    assert report["joints_beyond_limits"] == []
+    assert report["picture"] == str(out)
+    assert os.listdir(tmp_path) == ["a.png"]
+    assert out.read_bytes().startswith(b"\x89PNG")
+
+
+def test_python_m_reojax_prints_a_table_and_keeps_its_program(tmp_path):
+    """In a process of its own: text on stdout, nothing on stderr, the compiled program in the cache."""
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "JAX_COMPILATION_CACHE_DIR": ""}
+    del environment["REOJAX_CACHE"]
+    command = [sys.executable, "-W", "error", "-m", "reojax", "simulate"]
+    options = ["--robot", "six_body", "--manoeuvre", "b", "--bend", "-1.5e2"]
+    done = subprocess.run(command + options, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert lines[0] == "Manoeuvre B on six_body: twist 270 deg, bend -150 deg"
+    for label in ("rotation vector", "ZXZ angles", "momentum", "orthogonality", "halving the step"):
+        assert any(line.startswith(f"  {label}") for line in lines)
+    momentum = next(line.split()[1] for line in lines if line.startswith("  momentum"))
+    assert float(momentum) < 1e-10
+    assert "beyond the joint limits of six_body: bend" in lines
+    assert list((tmp_path / "reojax" / "jax").iterdir())
+
+
+def test_version():
+    done = subprocess.run([sys.executable, "-m", "reojax", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("reojax ")
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["simulate", "--help"]])
+def test_help(capsys, arguments):
+    assert main(arguments) == 0
+    assert "simulate" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "reojax: the following arguments are required: COMMAND"),
+        (["turn"], "reojax: argument COMMAND: invalid choice: 'turn'"),
+        (["simulate", "--manoeuvre", "c"], "reojax simulate: argument --manoeuvre: invalid choice: 'c'"),
+        (["simulate", "--twist", "far"], "reojax simulate: argument --twist: 'far' is not a number"),
+        (["simulate", "--bend", ""], "reojax simulate: argument --bend: '' is not a number"),
+        (["simulate", "--bend", "nan"], "reojax simulate: argument --bend: 'nan' is not a finite number"),
+        (["simulate", "--bend", "-inf"], "reojax simulate: argument --bend: '-inf' is not a finite number"),
+        (["simulate", "--bend=-1e9"], "reojax simulate: argument --bend: '-1e9' is beyond 36000 degrees"),
+        (["simulate", "--bend"], "reojax simulate: argument --bend: expected one argument"),
+        (["simulate", "--ben", "3"], "reojax: unrecognized arguments: --ben 3"),
+        (
+            ["simulate", "--robot", "cat"],
+            "reojax simulate: there is no robot named 'cat'; the names",
+        ),
+        (["simulate", "--robot", "planar3"], "reojax simulate: 'planar3' has 2 joints; the manoeuvres are"),
+        (
+            ["simulate", "--out", "/nowhere/a.png"],
+            "reojax simulate: cannot write '/nowhere/a.png': ",
+        ),
+        (
+            ["simulate", "--out", "a.bmp"],
+            "reojax simulate: cannot write 'a.bmp': the name of",
+        ),
+        (["simulate", "--out", ""], "reojax simulate: cannot write '': the name of"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(capsys, monkeypatch, tmp_path, arguments, message):
+    """Said before anything is computed, and nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(simulate, "_report", lambda *_: pytest.fail("computed"))
+    assert main(arguments) == 2
+    out, complaint = capsys.readouterr()
+    assert out == ""
+    assert complaint.startswith(message)
+    assert complaint.count("\n") == 1
+    assert os.listdir(tmp_path) == []
+
+
+def test_ctrl_c_is_status_130(monkeypatch):
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(simulate, "run", interrupt)
+    assert main(["simulate"]) == 130
+
+
+def test_a_reader_that_has_enough_is_no_error():
+    """`reojax ... | head -1` ends quietly."""
+    code = """
+import sys
+from reojax.cli import main, simulate
+simulate.run = lambda args: print("line " * 100_000)
+sys.exit(main(["simulate"]))
+"""
+    child = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert child.stdout is not None
+    child.stdout.close()
+    assert child.stderr is not None
+    assert child.stderr.read() == b""
+    child.stderr.close()
+    assert child.wait() == 0
+
+
+def test_files_are_whole_or_absent(tmp_path):
+    """A failure half way leaves the old file and nothing else; a link stays a link."""
+    old, link = tmp_path / "old.json", tmp_path / "link.json"
+    files.write_json(old, {"array": np.arange(2), "number": jnp.float64(0.5)})
+    assert json.loads(old.read_text()) == {"array": [0, 1], "number": 0.5}
+    link.symlink_to(old)
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        files.write_json(old, {"number": float("nan")})
+    with pytest.raises(TypeError, match="bytes-like"), files.replacing(link) as file:
+        file.writelines([b"half", None])  # pyright: ignore[reportArgumentType]
+    assert json.loads(old.read_text())["number"] == 0.5
+    files.write_json(link, [])
+    assert link.is_symlink()
+    assert old.read_text() == "[]\n"
+    assert sorted(os.listdir(tmp_path)) == ["link.json", "old.json"]
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        (".", "it is a folder"),
+        ("missing/a", "there is no folder"),
+        ("file/a", "there is no folder"),
+        ("/dev/null", "not a regular file"),
+        ("x" * 300, "File name too long"),
+    ],
+)
+def test_paths_that_cannot_be_written_are_refused(monkeypatch, tmp_path, path, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    with pytest.raises(ValueError, match=f"cannot write .*{message}"):
+        files.write_json(path, [])
+    assert os.listdir(tmp_path) == ["file"]
+
+
+def test_a_picture_that_fails_leaves_nothing(monkeypatch, tmp_path):
+    figure = Figure()
+    monkeypatch.setattr(figure, "savefig", lambda file, **_: file.writelines([b"half", None]))
+    with pytest.raises(TypeError, match="bytes-like"):
+        plot.save(figure, tmp_path / "a.svg")
+    assert os.listdir(tmp_path) == []
+
+
+def test_the_picture_shows_the_joints_and_the_tilt_and_roll():
+    """Curves end where the path and its rotations end; every edge has its name."""
+    robot = robots.prototype()
+    path = reojax.manoeuvre_b(4.0, 1.0)
+    rotations = Rotation.from_rotvec(np.outer(np.linspace(0, 1, 41), [0, 0.3, 0])).as_matrix()
+    figure = plot.history_figure(robot, path, edge_names="abcd", rotations=rotations)
+    above, below = figure.axes
+    np.testing.assert_allclose([line.get_ydata()[-1] for line in above.lines[:3]], [0, np.rad2deg(0.3), 0])
+    np.testing.assert_allclose(below.lines[1].get_ydata(), np.rad2deg([0, 1, 1, 0, 0]))
+    assert [label.get_text() for label in below.get_xticklabels()] == list("abcd")
+    assert "17.2" in above.texts[0].get_text()
+    with pytest.raises(ValueError, match="3 names; the path has 4 edges"):
+        plot.history_figure(robot, path, edge_names="abc", rotations=rotations)
+    with pytest.raises(ValueError, match="one waypoint"):
+        plot.history_figure(robot, reojax.polygon(np.zeros((1, 3))))
+
+
+def test_tilt_and_roll_make_up_the_rotation():
+    """`R = exp((tilt_x, tilt_y, 0)) Rz(roll)`, and the roll counts turns."""
+    rotations = Rotation.random(50, random_state=1).as_matrix()
+    angles = tilt_and_roll(rotations)
+    tilt, roll = Rotation.from_rotvec(angles * [1, 1, 0]), Rotation.from_rotvec(angles * [0, 0, 1])
+    np.testing.assert_allclose((tilt * roll).as_matrix(), rotations, atol=1e-12)
+    turns = Rotation.from_rotvec(np.outer(np.linspace(0, 15, 40), [0, 0, 1])).as_matrix()
+    np.testing.assert_allclose(tilt_and_roll(turns)[-1], [0, 0, 15], atol=1e-12)
+
+
+X64 = {"jax_enable_x64": True}
+
+
+@pytest.mark.parametrize(
+    ("cache", "given", "expected"),
+    [
+        (None, None, True),
+        ("1", None, True),
+        ("0", None, False),
+        (None, "/elsewhere", False),
+    ],
+)
+def test_the_cache_is_set_unless_it_is_off_or_set_already(monkeypatch, tmp_path, cache, given, expected):
+    told = _started(monkeypatch, tmp_path, cache, given)
+    folder = tmp_path / "reojax" / "jax"
+    assert (told.pop("jax_compilation_cache_dir", None) == str(folder)) is expected
+    assert folder.is_dir() is expected
+    assert told.pop("jax_enable_x64") is True
+
+
+def test_a_cache_that_cannot_be_breaks_nothing(monkeypatch, tmp_path):
+    (tmp_path / "reojax").touch()
+    assert _started(monkeypatch, tmp_path, None, None) == X64
+
+
+def _started(monkeypatch, folder, cache, given) -> dict:
+    """What `start` tells JAX."""
+    told = {}
+    config = SimpleNamespace(values={"jax_compilation_cache_dir": given}, update=told.__setitem__)
+    monkeypatch.setattr(session, "jax", SimpleNamespace(config=config))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    monkeypatch.delenv("REOJAX_CACHE")
+    if cache is not None:
+        monkeypatch.setenv("REOJAX_CACHE", cache)
+    session.start()
+    return told
+
+
+def test_the_cache_forgets_its_oldest_programs(tmp_path):
+    for age, name in enumerate(["new", "old", "oldest"]):
+        (tmp_path / name).write_bytes(bytes(100))
+        os.utime(tmp_path / name, (1e9 - age, 1e9 - age))
+    session._trim(tmp_path, 200)
+    assert sorted(os.listdir(tmp_path)) == ["new", "old"]
+
+
+def test_compiling_quickly_leaves_given_flags_alone(monkeypatch):
+    monkeypatch.setenv("XLA_FLAGS", "--xla_force_host_platform_device_count=2")
+    session.compile_quickly()
+    assert os.environ["XLA_FLAGS"] == "--xla_force_host_platform_device_count=2"
+    monkeypatch.delenv("XLA_FLAGS")
+    session.compile_quickly()
+    assert "--xla_backend_optimization_level=0" in os.environ["XLA_FLAGS"].split()

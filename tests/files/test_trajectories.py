@@ -1,0 +1,135 @@
+"""Trajectories in files: read back by other means, with the rules of ROS 2 controllers kept."""
+
+import csv
+import json
+import os
+
+import numpy as np
+import pytest
+
+from reojax import read_capture, robots
+from reojax.cli import main
+from reojax.files.trajectories import check_trajectory, write_trajectory
+
+ROBOT = robots.prototype().replace(joint_names=("twist1", "bend, centre", "twist2"))
+TIME = np.linspace(0.5, 1.5, 21)
+_U = (TIME - 0.5)[:, None]
+GOAL = np.array([1.0, -2.0, 0.5])
+THETA = GOAL * (10 * _U**3 - 15 * _U**4 + 6 * _U**5)
+RATE = GOAL * (30 * _U**2 - 60 * _U**3 + 30 * _U**4)
+ACCELERATION = GOAL * (60 * _U - 180 * _U**2 + 120 * _U**3)
+MOTION = (TIME, THETA, RATE, ACCELERATION)
+
+
+def test_csv_has_units_and_all_digits(tmp_path):
+    file = tmp_path / "t.csv"
+    write_trajectory(file, ROBOT, *MOTION, RATE)
+    with file.open() as lines:
+        header, *rows = csv.reader(lines)
+    assert header[:3] == ["time [s]", "twist1 [rad]", "bend, centre [rad]"]
+    assert header[4::3] == ["rate twist1 [rad/s]", "acceleration twist1 [rad/s^2]", "torque twist1 [N m]"]
+    numbers = np.array(rows, float)
+    expected = np.concatenate([TIME[:, None] - 0.5, THETA, RATE, ACCELERATION, RATE], axis=1)
+    np.testing.assert_allclose(numbers, expected, rtol=1e-11, atol=1e-11)
+
+
+@pytest.mark.parametrize("ending", ["yaml", "yml", "json"])
+def test_joint_trajectory(tmp_path, ending):
+    """As JSON, which is YAML; only fields of the message, times exact and increasing."""
+    file = tmp_path / f"t.{ending}"
+    write_trajectory(file, ROBOT, *MOTION, delay=1.98)
+    message = json.loads(file.read_text())
+    assert message.keys() == {"header", "joint_names", "points"}
+    assert message["joint_names"] == list(ROBOT.joint_names)
+    points = message["points"]
+    assert points[0].keys() == {"positions", "velocities", "accelerations", "time_from_start"}
+    np.testing.assert_array_equal([point["positions"] for point in points], THETA)
+    np.testing.assert_array_equal([point["accelerations"] for point in points], ACCELERATION)
+    stamps = [point["time_from_start"] for point in points]
+    assert stamps[0] == {"sec": 1, "nanosec": 980_000_000}
+    assert stamps[1] == {"sec": 2, "nanosec": 30_000_000}
+    assert all(0 <= stamp["nanosec"] < 10**9 and isinstance(stamp["sec"], int) for stamp in stamps)
+    write_trajectory(file, ROBOT, *MOTION, RATE)
+    np.testing.assert_array_equal([point["effort"] for point in json.loads(file.read_text())["points"]], RATE)
+
+
+def test_only_rest_to_rest_goes_to_a_controller(tmp_path):
+    """The whole file is refused, and the one that was there stays."""
+    file = tmp_path / "t.yaml"
+    file.write_text("old")
+    with pytest.raises(ValueError, match="the trajectory does not end at rest: joint 1 moves at -3.* rad/s"):
+        write_trajectory(file, ROBOT, *(column[:12] for column in MOTION))
+    with pytest.raises(ValueError, match="the trajectory does not start at rest"):
+        write_trajectory(file, ROBOT, *(column[10:] for column in MOTION))
+    assert file.read_text() == "old"
+    assert os.listdir(tmp_path) == ["t.yaml"]
+    write_trajectory(tmp_path / "t.csv", ROBOT, *(column[:12] for column in MOTION))
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"time": TIME[::-1]}, r"time\[1\] is 1.45 s, not after 1.5 s; times must increase"),
+        ({"time": 1e-9 * TIME}, "times must increase"),
+        ({"time": TIME[:1]}, "`time` has shape"),
+        ({"theta": THETA[:, :2]}, r"`theta` has shape \(21, 2\); for 'prototype' it must be \(21, 3\)"),
+        ({"theta_dot": RATE[1:]}, "`theta_dot` has shape"),
+        ({"theta_ddot": ACCELERATION * np.nan}, r"theta_ddot\[0, 0\] is not finite"),
+        ({"effort": "much"}, "`effort` is 'much'"),
+        ({"delay": -1.0}, "`delay` is -1.0"),
+        ({"path": "t.bag"}, "the name of a trajectory ends in one of .csv, .yaml, .yml, .json"),
+        ({"path": "nowhere/t.csv"}, "there is no folder"),
+    ],
+)
+def test_bad_input_writes_nothing(monkeypatch, tmp_path, changed, message):
+    monkeypatch.chdir(tmp_path)
+    given = {"path": "t.yaml", "time": TIME, "theta": THETA, "theta_dot": RATE, "theta_ddot": ACCELERATION}
+    with pytest.raises(ValueError, match=message):
+        write_trajectory(robot=ROBOT, **(given | changed))
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_place_can_be_asked_for_beforehand(tmp_path):
+    assert check_trajectory(tmp_path / "t.yaml") == tmp_path / "t.yaml"
+    assert os.listdir(tmp_path) == []
+
+
+def test_the_command_line_writes_what_it_says(capsys, monkeypatch, tmp_path):
+    """A manoeuvre as a file for a controller, and as one that `compare` can read."""
+    monkeypatch.setenv("REOJAX_CACHE", "0")
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "a.yaml", "--duration", "0.1", "--rate", "100", "--bend", "60"]) == 0
+    assert capsys.readouterr().out == "41 points in 0.4 s, written to a.yaml\n"
+    message = json.loads((tmp_path / "a.yaml").read_text())
+    np.testing.assert_allclose(message["points"][10]["positions"], [0, np.deg2rad(60), 0], atol=1e-12)
+    assert main(["export", "a.csv", "--duration", "0.1,0.2,0.1,0.2", "--torques", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["points"] == 121
+    capture = read_capture(tmp_path / "a.csv", robots.prototype())
+    np.testing.assert_allclose(capture.theta[60], np.deg2rad([270, 120, -270]), rtol=1e-11)
+    assert capture.ignored[-1] == "torque twist2 [N m]"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["a.yaml"], "reojax export: --duration is missing"),
+        (["a.yaml", "--duration", "0"], "reojax export: argument --duration: '0' must be positive and finite"),
+        (["a.csv", "--duration", "1e-300"], "reojax export: argument --duration: '1e-300' must be positive and finite"),
+        (["a.yaml", "--duration", "1,x"], "reojax export: argument --duration: '1,x' is not a number"),
+        (["a.yaml", "--duration", "1,2"], "reojax export: `durations` has shape (2,)"),
+        (["a.yaml", "--duration", "1", "--law", "jump"], "reojax export: there is no time law named 'jump'"),
+        (["a.yaml", "--duration", "1", "--rate", "0"], "reojax export: argument --rate: '0' must be positive"),
+        (["a.yaml", "--duration", "1e9"], "reojax export: 4e+09 s at 200 Hz are 800000000000 points"),
+        (["a.bag", "--duration", "1"], "reojax export: cannot write 'a.bag': the name of a trajectory"),
+        (["a.csv", "--duration", "1", "--robot", "planar2"], "reojax export: 'planar2' has 1 joints"),
+    ],
+)
+def test_bad_arguments_are_one_line_and_status_2(capsys, monkeypatch, tmp_path, arguments, message):
+    monkeypatch.setenv("REOJAX_CACHE", "0")
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", *arguments]) == 2
+    out, complaint = capsys.readouterr()
+    assert out == ""
+    assert complaint.startswith(message)
+    assert complaint.count("\n") == 1
+    assert os.listdir(tmp_path) == []

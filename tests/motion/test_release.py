@@ -1,0 +1,128 @@
+"""Imperfect releases: exact cases, the laws of momentum, and spreads by derivatives and by draws."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import reojax
+from reojax import Release, release_spread, released, robots, so3
+from reojax.mechanics.kinematics import kinematics
+
+ROBOT = robots.prototype()
+PATH = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
+PLAN = reojax.along(PATH, "quintic", [0.12, 0.18, 0.12, 0.18])
+STILL = reojax.along(reojax.polygon(np.zeros((2, 3))), "quintic", 0.6)
+FALLING = Release(momentum=(2e-5, -1e-5, 3e-5), pull=(0.0, 2e-3, -1e-3), tied=(0.0, 0.02, 0.05), drag=1e-6)
+
+
+def test_a_perfect_release_is_the_net_rotation():
+    motion = released(ROBOT, PLAN)
+    np.testing.assert_allclose(motion.rotation[-1], reojax.net_rotation(ROBOT, PATH), atol=2e-6)
+    finer = released(ROBOT, PLAN, steps=64)
+    np.testing.assert_allclose(finer.rotation[-1], reojax.net_rotation(ROBOT, PATH), atol=2e-7)
+    assert motion.time[-1] == pytest.approx(0.6)
+    np.testing.assert_array_equal(motion.momentum, 0)
+
+
+def test_momentum_alone_is_what_simulate_does():
+    momentum = np.array([1e-4, 2e-4, -1e-4])
+    expected = reojax.simulate(ROBOT, PLAN, momentum=momentum, samples=64).rotation
+    motion = released(ROBOT, PLAN, Release(momentum), steps=64)
+    np.testing.assert_allclose(motion.rotation, expected, atol=3e-7)
+    np.testing.assert_allclose(motion.momentum, np.tile(momentum, (len(motion.time), 1)), rtol=1e-14)
+
+
+def test_drag_stops_a_spin_exponentially():
+    """About a principal axis, a rigid body: `H = H0 exp(-c t / I)`, and the angle is its integral over I."""
+    still = robots.two_cylinder_cat(0.25)
+    trajectory = reojax.along(reojax.polygon(np.zeros((2, still.joints))), "quintic", 2.0)
+    inertia = np.asarray(reojax.momentum_matrices(still, np.zeros(still.joints)).A)
+    k = int(np.argmin(np.abs(inertia - np.diag(np.diag(inertia))).sum(0)))
+    size = inertia[k, k]
+    spin, drag = np.eye(3)[k] * size, 0.7 * size
+    motion = released(still, trajectory, Release(spin, drag=drag))
+    np.testing.assert_allclose(motion.momentum[-1], spin * np.exp(-1.4), rtol=1e-6, atol=1e-9 * size)
+    np.testing.assert_allclose(so3.log(motion.rotation[-1])[k], (1 - np.exp(-1.4)) / 0.7, rtol=1e-6)
+
+
+def test_a_wire_turns_the_momentum_by_its_moment():
+    """`H' = r x F` about the centre of mass, which the joints shift in the base."""
+    wire = FALLING._replace(drag=0.0)
+    motion = released(ROBOT, PLAN, wire)
+    theta = np.asarray(jax.vmap(PLAN.at)(motion.time).theta)
+    middle = ROBOT.com[0] - np.asarray(jax.vmap(lambda t: kinematics(ROBOT, t).centre[0])(theta))
+    moment = np.cross(np.einsum("mab,mb->ma", motion.rotation, np.asarray(wire.tied) - middle), wire.pull)
+    time = np.asarray(motion.time)
+    gained = np.concatenate([[np.zeros(3)], np.cumsum(0.5 * (moment[1:] + moment[:-1]) * np.diff(time)[:, None], 0)])
+    np.testing.assert_allclose(motion.momentum, np.asarray(wire.momentum) + gained, atol=2e-3 * np.abs(gained).max())
+
+
+def test_slower_motions_turn_further_from_a_spin():
+    """With momentum, time matters: the thesis's rule is of zero momentum only."""
+    spin = Release((0.0, 0.0, 5e-5))
+    ends = []
+    for duration in (0.15, 0.3):
+        perfect, spun = (
+            released(ROBOT, reojax.along(PATH, "quintic", duration), r).rotation[-1] for r in (Release(), spin)
+        )
+        ends.append(float(so3.angle(perfect.T @ spun)))
+    assert 1.9 < ends[1] / ends[0] < 2.1
+
+
+def test_spread_by_derivatives_and_by_draws():
+    deviation = Release((2e-6, 2e-6, 2e-6), (2e-4, 2e-4, 2e-4), (1e-3, 1e-3, 1e-3), 1e-7)
+    wire = Release(pull=(0.0, 0.0, 2e-3), tied=(0.0, 0.0, 0.05))
+    spread = release_spread(ROBOT, PLAN, deviation, jax.random.key(0), expected=wire, draws=512)
+    np.testing.assert_allclose(spread.rotation, released(ROBOT, PLAN, wire).rotation[-1], atol=1e-12)
+    scale = np.sqrt(np.diag(spread.covariance))
+    drawn = np.sqrt(np.diag(spread.drawn_covariance))
+    np.testing.assert_allclose(drawn, scale, rtol=0.12)  # 512 draws: 3 %
+    assert spread.drawn_angle_rms == pytest.approx(float(spread.angle_rms), rel=0.1)
+    assert spread.angle_rms > 1e-3
+    none = release_spread(ROBOT, PLAN, Release(), jax.random.key(0), expected=wire, draws=512)
+    np.testing.assert_array_equal(none.covariance, 0)
+    np.testing.assert_allclose(none.drawn, 0, atol=1e-14)
+    np.testing.assert_array_equal(none.sensitivity, spread.sensitivity)
+
+
+def test_sensitivities_agree_with_differences():
+    spread = release_spread(ROBOT, PLAN, Release(), jax.random.key(0), expected=FALLING, draws=512)
+    ends = jax.jit(lambda pull: released(ROBOT, PLAN, FALLING._replace(pull=pull)).rotation[-1])
+    for k, step in enumerate(1e-5 * np.eye(3)):
+        turns = [ends(jnp.asarray(FALLING.pull) + sign * step) for sign in (1, -1)]
+        column = (so3.log(spread.rotation.T @ turns[0]) - so3.log(spread.rotation.T @ turns[1])) / 2e-5
+        np.testing.assert_allclose(spread.sensitivity[:, 3 + k], column, rtol=1e-4, atol=1e-4)
+
+
+def test_float32():
+    plan = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), PLAN)
+    motion = released(ROBOT, plan, FALLING)
+    assert {leaf.dtype for leaf in motion} == {jnp.dtype(jnp.float32)}
+    np.testing.assert_allclose(motion.rotation[-1], released(ROBOT, PLAN, FALLING).rotation[-1], atol=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((ROBOT, PLAN, Release((0, 0))), r"release.momentum has shape \(2,\)"),
+        ((ROBOT, PLAN, Release(drag=np.inf)), "release.drag is inf; it must be finite"),
+        ((ROBOT, PLAN, Release(pull="up")), "`release.pull` is 'up'"),
+        ((ROBOT, PLAN, 3), "`release` is a int"),
+        ((ROBOT, PATH), "`trajectory` is a Path"),
+        ((robots.planar(2), PLAN), "`trajectory` moves 3 joints; 'planar2' has 1"),
+        ((None, PLAN), "`robot` is a NoneType"),
+    ],
+)
+def test_bad_input(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        released(*arguments)
+
+
+def test_more_bad_input():
+    with pytest.raises(ValueError, match="`steps` is 0"):
+        released(ROBOT, PLAN, steps=0)
+    with pytest.raises(ValueError, match="`draws` is 0"):
+        release_spread(ROBOT, PLAN, Release(), jax.random.key(0), draws=0)
+    with pytest.raises(ValueError, match="standard deviations must not be negative"):
+        release_spread(ROBOT, PLAN, Release(drag=-1.0), jax.random.key(0))
