@@ -3,12 +3,13 @@
 from typing import TYPE_CHECKING, Any
 
 from reojax import design, robots, so3
+from reojax.capsules import Capsule
 from reojax.captures.calibration import Calibration, calibrate
 from reojax.captures.capture import Capture, make_capture, read_capture
 from reojax.captures.comparison import Comparison, Sampled, compare, joints_simulated
 from reojax.captures.parameters import Parameter
 from reojax.files.trajectories import write_trajectory
-from reojax.manoeuvres import FOUR_BODY, SIX_BODY, Layout, layout_for, manoeuvre_a, manoeuvre_b
+from reojax.manoeuvres import FOUR_BODY, SIX_BODY, Layout, manoeuvre_a, manoeuvre_b
 from reojax.mechanics.certificate import Certificate, certify
 from reojax.mechanics.curvature import curvature
 from reojax.mechanics.dynamics import (
@@ -32,7 +33,7 @@ from reojax.path import Path, joint_travel, polygon
 from reojax.planning.free_path import FreePaths, free_path, free_paths
 from reojax.planning.plan import plan, plan_many, replan
 from reojax.planning.result import Plan
-from reojax.robot import Robot, make_robot
+from reojax.robot import Robot, layout_of, make_robot
 from reojax.sweeps.grid import zipped
 from reojax.sweeps.merge import merge
 from reojax.sweeps.result import BadDesign, Sweep
@@ -48,6 +49,7 @@ __all__ = [
     "base_velocity",
     "calibrate",
     "Calibration",
+    "Capsule",
     "Capture",
     "Certificate",
     "certify",
@@ -73,7 +75,7 @@ __all__ = [
     "kinetic_energy",
     "Law",
     "Layout",
-    "layout_for",
+    "layout_of",
     "LeastTime",
     "make_capture",
     "make_robot",

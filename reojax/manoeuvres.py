@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array, as_numbers, is_concrete
 from reojax.path import Path, polygon
-from reojax.robot import Robot
 
 
 class Layout(NamedTuple):
@@ -37,19 +36,6 @@ FOUR_BODY = Layout(joints=3, twist=(0, 2), bend=1)
 
 SIX_BODY = Layout(joints=5, twist=(1, 3), bend=2, fold=(0, 4), fold_angle=(pi / 2, -pi / 2))
 """The thesis's full cat: six links, the feet fold and unfold (thesis 1.4)."""
-
-
-def layout_for(robot: Robot) -> Layout:
-    """Return the layout for `robot` by its number of joints, `FOUR_BODY` or `SIX_BODY`.
-
-    Raises:
-        ValueError: for any other number of joints.
-    """
-    layouts = {layout.joints: layout for layout in (FOUR_BODY, SIX_BODY)}
-    if robot.joints not in layouts:
-        known = " or ".join(map(str, layouts))
-        raise ValueError(f"{robot.name!r} has {robot.joints} joints; the manoeuvres are laid out for {known} joints.")
-    return layouts[robot.joints]
 
 
 def manoeuvre_a(twist: ArrayLike, bend: ArrayLike, layout: Layout = FOUR_BODY) -> Path:
@@ -80,7 +66,7 @@ def manoeuvre_b(twist: ArrayLike, bend: ArrayLike, layout: Layout = FOUR_BODY) -
 def _rectangle(twist: ArrayLike, bend: ArrayLike, layout: Layout, last: int) -> Path:
     """Corners of the loop, the last distal joint turning `last` times the first one's way."""
     twist, bend = _amplitude("twist", twist), _amplitude("bend", bend)
-    _check_layout(layout)
+    check_layout(layout)
     first, second = layout.twist
     bending = _shape(layout, {layout.bend: 1.0})
     twisting = _shape(layout, {first: 1.0, second: float(last)})
@@ -111,7 +97,8 @@ def _amplitude(entry: str, value: ArrayLike) -> Array:
     return number
 
 
-def _check_layout(layout: Layout) -> None:
+def check_layout(layout: Layout) -> None:
+    """Raise a `ValueError` for a layout that contradicts itself."""
     if not isinstance(layout, Layout):
         raise ValueError(f"`layout` is {layout!r}; it must be a Layout, such as FOUR_BODY.")
     used: Sequence[int] = (*layout.twist, layout.bend, *(layout.fold or ()))

@@ -8,7 +8,7 @@ Link 0 is the base (link 1 of the thesis). Joint `k` carries link `k + 1` and ha
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import jax
@@ -18,8 +18,13 @@ from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array
 from reojax._internal.robot_checks import check_robot
+from reojax.capsules import Capsule
+from reojax.manoeuvres import Layout
 
 Side = Literal["parent", "child"]
+
+_FREE = ("collision_pairs", "couplings", "layout", "notes")
+"""Static fields that `replace` may change in length."""
 
 
 def _static() -> Any:
@@ -53,6 +58,16 @@ class Robot:
     """Lower joint limits [rad]."""
     upper: Float[Array, " j"]
     """Upper joint limits [rad]."""
+    capsule_start: Float[Array, "c 3"]
+    """First end of each capsule's centre line, in the frame of the link that carries it [m]."""
+    capsule_end: Float[Array, "c 3"]
+    """Second end, likewise; a sphere where it equals the first [m]."""
+    capsule_radius: Float[Array, " c"]
+    """Radii of the capsules [m]."""
+    coupling_ratio: Float[Array, " d"]
+    """Of each coupled (mimic) joint: `theta[joint] = ratio * theta[driver] + offset`."""
+    coupling_offset: Float[Array, " d"]
+    """Likewise [rad]."""
     parent: tuple[int, ...] = _static()
     """Link that each joint hangs from."""
     rotor_on: tuple[Side, ...] = _static()
@@ -60,6 +75,16 @@ class Robot:
     link_names: tuple[str, ...] = _static()
     joint_names: tuple[str, ...] = _static()
     name: str = _static()
+    capsule_link: tuple[int, ...] = _static()
+    """Link that carries each capsule."""
+    collision_pairs: tuple[tuple[int, int], ...] = _static()
+    """Pairs of capsules that must stay clear of each other."""
+    couplings: tuple[tuple[int, int], ...] = _static()
+    """Coupled joints, each with its driver, which is a joint that is not coupled itself."""
+    layout: Layout | None = _static()
+    """Which joints twist, bend and fold in manoeuvres A and B; None for a robot that has no such parts."""
+    notes: tuple[str, ...] = _static()
+    """What was merged, locked, dropped or assumed when the robot was read from a file or built."""
 
     @property
     def links(self) -> int:
@@ -71,11 +96,21 @@ class Robot:
         """Number of joints, `j = n - 1`."""
         return len(self.parent)
 
+    @property
+    def capsules(self) -> tuple[Capsule, ...]:
+        """The shapes that links are taken to have, for clearance and for pictures."""
+        return tuple(
+            Capsule(link, start, end, radius)
+            for link, start, end, radius in zip(
+                self.capsule_link, self.capsule_start, self.capsule_end, self.capsule_radius, strict=True
+            )
+        )
+
     def replace(self, **fields: Any) -> "Robot":
         """Return a copy with some fields changed.
 
         Takes traced values, so that it can sit inside `vmap` and `grad`; only names and shapes are
-        checked. Static fields (`parent`, `rotor_on`, names) keep their lengths.
+        checked. Static fields (`parent`, `rotor_on`, names, `capsule_link`) keep their lengths.
 
         Raises:
             ValueError: for a field that a robot does not have, or a wrong shape.
@@ -85,7 +120,7 @@ class Robot:
             if key not in known:
                 raise ValueError(f"a robot has no field {key!r}; its fields are {', '.join(sorted(known))}.")
             old = getattr(self, key)
-            if isinstance(old, str):
+            if isinstance(old, str) or key in _FREE:
                 continue
             if isinstance(old, tuple):
                 fields[key] = tuple(value)
@@ -117,6 +152,11 @@ def make_robot(
     link_names: Sequence[str] | None = None,
     joint_names: Sequence[str] | None = None,
     name: str = "robot",
+    capsules: Sequence[Capsule] = (),
+    collision_pairs: Sequence[tuple[int, int]] | None = None,
+    couplings: Mapping[int | str, tuple[int | str, float, float]] | None = None,
+    layout: Layout | None = None,
+    notes: Sequence[str] = (),
 ) -> Robot:
     """Build a robot from plain numbers, and refuse what no robot can have.
 
@@ -138,6 +178,13 @@ def make_robot(
         link_names: (n,) names, distinct.
         joint_names: (j,) names, distinct.
         name: the robot's name.
+        capsules: shapes of the links, any number each, for clearance and for pictures.
+        collision_pairs: pairs of numbers of capsules that must stay clear of each other; default all whose links are
+            neither the same nor joined directly, and that do not touch at `theta = 0`.
+        couplings: joint -> (driver, ratio, offset [rad]) for joints that follow another one,
+            `theta[joint] = ratio * theta[driver] + offset`; joints by number or name.
+        layout: which joints twist, bend and fold in manoeuvres; default none.
+        notes: what should be told about where the numbers come from.
 
     Raises:
         ValueError: naming the entry, its value and the rule it breaks.
@@ -158,5 +205,24 @@ def make_robot(
             link_names=link_names,
             joint_names=joint_names,
             name=name,
+            capsules=capsules,
+            collision_pairs=collision_pairs,
+            couplings=couplings,
+            layout=layout,
+            notes=notes,
         )
     )
+
+
+def layout_of(robot: Robot) -> Layout:
+    """Return the robot's own layout; it is never guessed.
+
+    Raises:
+        ValueError: if it has none.
+    """
+    if robot.layout is None:
+        raise ValueError(
+            f"{robot.name!r} has no layout of its own: pass `layout=Layout(joints, twist, bend)` that names its twist "
+            "pair and its bend joint, or use `free_path`, which needs none."
+        )
+    return robot.layout

@@ -148,7 +148,7 @@ def from_quaternion(quaternion: ArrayLike) -> Float[Array, "3 3"]:
     Raises:
         ValueError: if `quaternion` is not of shape (4,).
     """
-    q, _ = _scaled(_floats(quaternion, "quaternion", (4,)))
+    q, _ = _scale(_floats(quaternion, "quaternion", (4,)))
     return _quaternion_matrix(q[0], q[1:], jnp.sum(q * q))
 
 
@@ -170,7 +170,7 @@ def to_euler_zxz(rotation: ArrayLike) -> Float[Array, "3"]:
     sine, half_difference = _polar(x, y)
     half_difference = jnp.where(sine == 0, half_sum, half_difference)
     half_sum = jnp.where(cosine == 0, half_difference, half_sum)
-    a, c = _wrapped(half_sum + half_difference), _wrapped(half_sum - half_difference)
+    a, c = _wrap(half_sum + half_difference), _wrap(half_sum - half_difference)
     return jnp.stack([a, 2 * jnp.arctan2(sine, cosine), c])
 
 
@@ -276,7 +276,7 @@ def _unit_quaternion(r: jax.Array) -> jax.Array:
     return jnp.where(q[0] < 0, -q, q)
 
 
-def _scaled(vector: jax.Array) -> tuple[jax.Array, jax.Array]:
+def _scale(vector: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Return `vector / scale` and `scale`: its largest component, or 1 at zero; a constant to autodiff."""
     scale = lax.stop_gradient(jnp.max(jnp.abs(vector)))
     scale = jnp.where(scale > jnp.finfo(vector.dtype).tiny, scale, 1.0)
@@ -285,7 +285,7 @@ def _scaled(vector: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 def _length(vector: jax.Array) -> jax.Array:
     """Length of a vector, with derivative 0 at zero."""
-    unit, scale = _scaled(vector)
+    unit, scale = _scale(vector)
     square = jnp.sum(unit * unit)
     zero = square == 0
     return jnp.where(zero, 0.0, scale * jnp.sqrt(jnp.where(zero, 1.0, square)))
@@ -294,11 +294,11 @@ def _length(vector: jax.Array) -> jax.Array:
 def _polar(x: jax.Array, y: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Length and direction of (x, y); the direction of (0, 0) is 0, and both have derivative 0 there."""
     length = _length(jnp.stack([x, y]))
-    x, y = _scaled(jnp.stack([x, y]))[0]
+    x, y = _scale(jnp.stack([x, y]))[0]
     return length, jnp.arctan2(jnp.where(length == 0, 0.0, y), jnp.where(length == 0, 1.0, x))
 
 
-def _wrapped(turn: jax.Array) -> jax.Array:
+def _wrap(turn: jax.Array) -> jax.Array:
     """Angle in (-3 pi, 3 pi) brought to (-pi, pi]."""
     turn = jnp.where(turn > math.pi, turn - 2 * math.pi, turn)
     return jnp.where(turn <= -math.pi, turn + 2 * math.pi, turn)

@@ -16,8 +16,8 @@ ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "reojax"
 
 ORDER = (
-    "_internal session so3 path robot sweeps manoeuvres mechanics collision robots models interop optimisation "
-    "motion design planning captures steering files plot viewer cli"
+    "_internal session so3 path manoeuvres capsules robot sweeps mechanics collision robots models interop "
+    "optimisation motion design planning captures steering files plot viewer cli"
 ).split()
 """Packages and single modules, each of which imports only what stands before it."""
 

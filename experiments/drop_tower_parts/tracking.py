@@ -9,7 +9,7 @@ import numpy as np
 
 import reojax
 from reojax import plot, robots
-from reojax.captures.comparison import interpolated
+from reojax.captures.comparison import interpolate
 from reojax.mechanics.attitude import tilt_and_roll, zxz_beside, zxz_without_jumps
 from reojax.motion.pid import FEEDFORWARD_BANDWIDTH, PID_BANDWIDTH, Tracking, gains, track
 from reojax.motion.release import released
@@ -73,7 +73,7 @@ def section(out: Path, *, quick: bool, durations: Sequence[float] = DURATIONS) -
         for name, (forward, bandwidth) in CASES.items():
             done = track(robot, trajectory, motors(), gains(robot, bandwidth), feedforward=forward, settle=SETTLE)
             done = jax.tree.map(np.asarray, done)
-            planned = interpolated(np.asarray(ideal.time), np.asarray(ideal.rotation))(done.time)
+            planned = interpolate(np.asarray(ideal.time), np.asarray(ideal.rotation))(done.time)
             rms = zxz_rms(done, planned)
             apart = tilt_and_roll(done.rotation) - tilt_and_roll(planned)
             last = done.rotation[-1].T @ planned[-1]

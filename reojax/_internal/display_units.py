@@ -5,6 +5,6 @@ from math import pi
 _SHOWN = {"rad": ("deg", 180 / pi), "kg m^2": ("kg mm^2", 1e6)}
 
 
-def shown(unit: str) -> tuple[str, float]:
+def display_unit(unit: str) -> tuple[str, float]:
     """Return the unit that is shown for a unit inside, and the factor from one to the other."""
     return _SHOWN.get(unit, (unit, 1.0))

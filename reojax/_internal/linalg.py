@@ -60,7 +60,7 @@ def cholesky_solve(lower: Float[Array, "n n"], right: Float[Array, "n ..."]) -> 
     return jnp.stack(solution[::-1])
 
 
-def factored(matrix: Float[Array, "n n"]) -> Float[Array, "n n"]:
+def factor(matrix: Float[Array, "n n"]) -> Float[Array, "n n"]:
     """Upper triangular `U` of `U.T @ U = matrix`, symmetric positive definite, for `solve_factored`.
 
     A loop, not unrolled: short to compile at any n. Where rounding has left nothing of a pivot, it becomes so large

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from reojax._internal.capsule_checks import check_capsules, check_pairs, default_pairs
+
 _TOLERANCE = 1e-6
 """Relative rounding allowed in unit lengths, symmetry and the triangle rule (float32 data pass)."""
 
@@ -35,7 +37,7 @@ def refuse(entry: str, array: np.ndarray, bad: np.ndarray, rule: str, unit: str 
         raise ValueError(f"{entry}[{where}] is {array[index].tolist()}{unit}; {rule}.")
 
 
-def _listed(entry: str, value: Any, default: Sequence[Any], what: str) -> tuple[Any, ...]:
+def _as_list(entry: str, value: Any, default: Sequence[Any], what: str) -> tuple[Any, ...]:
     if value is None:
         return tuple(default)
     items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else None
@@ -45,7 +47,7 @@ def _listed(entry: str, value: Any, default: Sequence[Any], what: str) -> tuple[
 
 
 def _names(entry: str, value: Any, default: list[str]) -> tuple[str, ...]:
-    names = _listed(entry, value, default, f"{len(default)} names")
+    names = _as_list(entry, value, default, f"{len(default)} names")
     for k, name in enumerate(names):
         if not isinstance(name, str) or not name:
             raise ValueError(f"{entry}[{k}] is {name!r}; it must be a non-empty string.")
@@ -55,7 +57,7 @@ def _names(entry: str, value: Any, default: list[str]) -> tuple[str, ...]:
 
 
 def _parents(value: Any, joints: int) -> tuple[int, ...]:
-    parents = _listed("parent", value, range(joints), f"the link that each of {joints} joints hangs from")
+    parents = _as_list("parent", value, range(joints), f"the link that each of {joints} joints hangs from")
     for k, parent in enumerate(parents):
         if isinstance(parent, bool) or not isinstance(parent, int | np.integer) or not 0 <= parent <= k:
             raise ValueError(
@@ -67,7 +69,7 @@ def _parents(value: Any, joints: int) -> tuple[int, ...]:
 
 def _sides(value: Any, joints: int) -> tuple[str, ...]:
     rule = f"'parent' or 'child' for each of {joints} joints"
-    sides = _listed("rotor_on", value, ("parent",) * joints, rule)
+    sides = _as_list("rotor_on", value, ("parent",) * joints, rule)
     for k, side in enumerate(sides):
         if side not in ("parent", "child"):
             raise ValueError(f"rotor_on[{k}] is {side!r}; it must be 'parent' or 'child'.")
@@ -86,6 +88,30 @@ def _inertias(value: Any, links: int) -> np.ndarray:
                 "are positive and none is larger than the sum of the other two."
             )
     return 0.5 * (inertia + inertia.swapaxes(1, 2))
+
+
+def _couplings(value: Any, names: tuple[str, ...]) -> dict[str, Any]:
+    """Coupled joints as the fields `couplings`, `coupling_ratio` and `coupling_offset` of `Robot`."""
+
+    def joint(given: Any, entry: str) -> int:
+        if isinstance(given, str) and given in names:
+            return names.index(given)
+        if isinstance(given, bool) or not isinstance(given, int | np.integer) or not 0 <= given < len(names):
+            raise ValueError(f"{entry} is {given!r}; the joints are {', '.join(names)}.")
+        return int(given)
+
+    pairs, numbers_ = [], []
+    for key, rule in dict(value or {}).items():
+        if not isinstance(rule, tuple | list) or len(rule) != 3:
+            raise ValueError(f"couplings[{key!r}] is {rule!r}; it must be (driver, ratio, offset).")
+        pairs.append((joint(key, "a joint of `couplings`"), joint(rule[0], f"couplings[{key!r}][0]")))
+        numbers_.append(numbers(f"couplings[{key!r}][1:]", rule[1:], (2,)))
+    followers = {follower for follower, _ in pairs}
+    for follower, driver in pairs:
+        if driver in followers:
+            raise ValueError(f"joint {names[follower]!r} follows {names[driver]!r}, which must not follow another one.")
+    both = np.array(numbers_, float).reshape(-1, 2)
+    return {"couplings": tuple(pairs), "coupling_ratio": both[:, 0].copy(), "coupling_offset": both[:, 1].copy()}
 
 
 def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str, Any]:
@@ -127,6 +153,19 @@ def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str,
         "joint_names": _names("joint_names", entries["joint_names"], [f"joint{k}" for k in range(joints)]),
         "name": name,
     }
+    fields |= _couplings(entries["couplings"], fields["joint_names"])
+    fields |= check_capsules(entries["capsules"], fields["link_names"])
+    fields["notes"] = tuple(map(str, entries["notes"]))
+    if entries["collision_pairs"] is None:
+        fields["collision_pairs"], touching = default_pairs(fields)
+        fields["notes"] += tuple(
+            f"capsules {a} and {b} ({fields['link_names'][fields['capsule_link'][a]]}, "
+            f"{fields['link_names'][fields['capsule_link'][b]]}) touch at rest: not kept apart"
+            for a, b in touching
+        )
+    else:
+        fields["collision_pairs"] = check_pairs(entries["collision_pairs"], fields["capsule_link"])
+    fields["layout"] = entries["layout"]
     for field in fields.values():
         if isinstance(field, np.ndarray):
             field.setflags(write=False)

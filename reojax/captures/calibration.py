@@ -27,8 +27,8 @@ from jaxtyping import Float
 from reojax import so3
 from reojax._internal.arrays import Array
 from reojax.captures.capture import Capture
-from reojax.captures.comparison import BLOCK, align_frames, filled, interpolated
-from reojax.captures.parameters import Parameter, Put, chosen
+from reojax.captures.comparison import BLOCK, align_frames, fill_gaps, interpolate
+from reojax.captures.parameters import Parameter, Put, resolve
 from reojax.mechanics.momentum import connection
 from reojax.robot import Robot
 
@@ -100,17 +100,17 @@ def calibrate(
     """
     if not isinstance(robot, Robot):
         raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
-    fitted = chosen(robot, parameters)
+    fitted = resolve(robot, parameters)
     problem = _Problem(robot, capture, fitted, clock)
     noise = _joint_noise(capture) if joint_noise is None else float(joint_noise)
     if not (np.isfinite(noise) and noise >= 0):
         raise ValueError(f"`joint_noise` is {joint_noise}; it must be a finite angle in radians, not negative.")
 
     start = np.array([p.start for p in fitted])
-    state = problem.settled(start)
+    state = problem.fit_window(start)
     before, damping, converged, step = state.rms, 1e-6, False, 0
     for step in range(1, max_steps + 1):  # noqa: B007
-        tried = problem.moved(state, damping)
+        tried = problem.move(state, damping)
         if tried.cost <= state.cost * (1 + 1e-12):
             change = np.abs((tried.x - state.x) / problem.scale).max(initial=0)
             gain = state.cost - tried.cost
@@ -153,7 +153,7 @@ class _Problem:
             raise ValueError("a calibration needs joint angles and orientation; the capture lacks one of them.")
         if capture.theta.shape[1] != robot.joints:
             raise ValueError(f"the capture has {capture.theta.shape[1]} joints; {robot.name!r} has {robot.joints}.")
-        theta = filled(capture)
+        theta = fill_gaps(capture)
         self.robot, self.fitted, self.clock, self.time = robot, fitted, clock, capture.time
         self.seen = np.flatnonzero(capture.seen_rotation)
         self.measured = np.asarray(capture.rotation)[self.seen]
@@ -165,15 +165,15 @@ class _Problem:
         if 3 * len(self.seen) <= unknowns:
             raise ValueError(f"{len(self.seen)} frames with an orientation cannot determine {unknowns} numbers.")
 
-    def settled(self, x: np.ndarray) -> _State:
+    def fit_window(self, x: np.ndarray) -> _State:
         """The state at the parameters `x`, frame and shift at their best."""
-        turned, _ = self._turned(x)
+        turned, _ = self._orientation(x)
         state = self._state(x, align_frames(self.measured, turned[self.seen]), 0.0)
         for _ in range(10 if self.clock else 3):
             state = self._state(x, *self._nuisance(state, self._step(state, 1e-12, fixed=True)))
         return state
 
-    def moved(self, state: _State, damping: float) -> _State:
+    def move(self, state: _State, damping: float) -> _State:
         """The state after a damped step from `state`."""
         step = self._step(state, damping)
         x = state.x + step[: len(state.x)] * self.scale
@@ -198,7 +198,7 @@ class _Problem:
         offset = float(np.clip(state.offset + rest[3], -most, most)) if self.clock else 0.0
         return Rotation.from_rotvec(rest[:3]).as_matrix() @ state.frame, offset
 
-    def _turned(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _orientation(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Orientation at every frame, and the effect of parameters and ends of each edge on all later ones."""
         turns, effect = _edges(tuple(p.put for p in self.fitted), x, self.robot, self.theta)
         turns, effect = np.asarray(turns)[: self.edges], np.asarray(effect)[: self.edges]
@@ -211,10 +211,10 @@ class _Problem:
     def _state(self, x: np.ndarray, frame: np.ndarray, offset: float) -> _State:
         from scipy.spatial.transform import Rotation
 
-        turned, effect = self._turned(x)
+        turned, effect = self._orientation(x)
         when = np.clip(self.time[self.seen] - offset, self.time[0], self.time[-1])
         residual = Rotation.from_matrix(
-            self.measured @ (frame @ interpolated(self.time, turned)(when)).swapaxes(1, 2)
+            self.measured @ (frame @ interpolate(self.time, turned)(when)).swapaxes(1, 2)
         ).as_rotvec()
         p = len(x)
         running = np.concatenate([np.zeros((1, 3, p)), np.cumsum(effect[..., :p] * self.scale, axis=0)])

@@ -62,7 +62,7 @@ def read_header(cells: Sequence[str], joint_names: Sequence[str], angle_unit: st
         return RADIANS[unit]
 
     if "time" not in found:
-        raise ValueError(f"there is no column 'time'; the columns are {_listed(cells)}.")
+        raise ValueError(f"there is no column 'time'; the columns are {_as_list(cells)}.")
     unit = units["time"] or "s"
     if unit not in SECONDS:
         raise ValueError(f"column {cells[found['time']]!r} has the unit {unit!r}; time is in s, ms, us or ns.")
@@ -74,7 +74,7 @@ def read_header(cells: Sequence[str], joint_names: Sequence[str], angle_unit: st
         names = ", ".join(joint_names)
         raise ValueError(
             f"there are neither joint angles ({names}, or theta1 to theta{len(joint_names)}) nor an orientation "
-            f"(qw to qz, or zxz1 to zxz3); the columns are {_listed(cells)}."
+            f"(qw to qz, or zxz1 to zxz3); the columns are {_as_list(cells)}."
         )
     return Columns(
         time=found["time"],
@@ -116,10 +116,10 @@ def _all_or_none(
     if missing:
         index = list(keys).index(missing[0])
         also = "" if names is None or _plain(names[index]) == missing[0] else f" (joint {names[index]!r})"
-        raise ValueError(f"column {missing[0]!r}{also} is missing; the columns are {_listed(cells)}.")
+        raise ValueError(f"column {missing[0]!r}{also} is missing; the columns are {_as_list(cells)}.")
     return tuple(found[key] for key in keys)
 
 
-def _listed(cells: Sequence[str]) -> str:
+def _as_list(cells: Sequence[str]) -> str:
     shown = ", ".join(cells[:20])
     return shown if len(cells) <= 20 else f"{shown}, and {len(cells) - 20} more"

@@ -99,14 +99,14 @@ def joints_simulated(robot: Robot, capture: Capture) -> Sampled:
     _check_joints(robot, capture)
     if capture.theta is None:
         raise ValueError("the capture has no joint angles, so its orientation cannot be simulated from them.")
-    theta = filled(capture)
+    theta = fill_gaps(capture)
     edges = -(-(len(theta) - 1) // BLOCK) * BLOCK
     padded = np.concatenate([theta, np.repeat(theta[-1:], edges + 1 - len(theta), axis=0)])
     history = np.asarray(rotation_history(robot, polygon(padded), samples=1), float)
     return Sampled(capture.time, theta, history[: len(theta)])
 
 
-def filled(capture: Capture) -> Float[np.ndarray, "m j"]:
+def fill_gaps(capture: Capture) -> Float[np.ndarray, "m j"]:
     """Joint angles of a capture, gaps filled in [rad].
 
     Raises:
@@ -156,7 +156,7 @@ def compare(
         offset, found = align(capture, simulated)
     elif not np.isfinite(offset):
         raise ValueError(f"`offset` is {offset}; it must be a finite time in seconds.")
-    return _compared(capture, simulated, float(offset), found)
+    return _comparison(capture, simulated, float(offset), found)
 
 
 def align(capture: Capture, motion: Simulated) -> tuple[float, bool]:
@@ -214,7 +214,7 @@ def _joint_cost(capture: Capture, motion: Simulated) -> Callable[[float], float]
 def _turn_cost(capture: Capture, motion: Simulated) -> Callable[[float], float]:
     seen = capture.seen_rotation
     time, measured = capture.time[seen], np.asarray(capture.rotation)[seen]
-    at = interpolated(np.asarray(motion.time, float), np.asarray(motion.rotation, float))
+    at = interpolate(np.asarray(motion.time, float), np.asarray(motion.rotation, float))
 
     def cost(shift: float) -> float:
         """Mean of `1 - cos(angle)`, about half the square of the angle, with the best frame of the cameras."""
@@ -225,7 +225,7 @@ def _turn_cost(capture: Capture, motion: Simulated) -> Callable[[float], float]:
     return cost
 
 
-def interpolated(time: np.ndarray, rotation: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+def interpolate(time: np.ndarray, rotation: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     """Orientation as a function of time, at rest before the first and after the last one."""
     from scipy.spatial.transform import Rotation, Slerp
 
@@ -233,10 +233,10 @@ def interpolated(time: np.ndarray, rotation: np.ndarray) -> Callable[[np.ndarray
     return lambda when: turn(np.clip(when, time[0], time[-1])).as_matrix()
 
 
-def _compared(capture: Capture, motion: Sampled, offset: float, found: bool) -> Comparison:
+def _comparison(capture: Capture, motion: Sampled, offset: float, found: bool) -> Comparison:
     time = capture.time - offset
     frames = len(time)
-    simulated = interpolated(motion.time, motion.rotation)(time)
+    simulated = interpolate(motion.time, motion.rotation)(time)
     start = motion.rotation[0]
     simulated = start.T @ simulated
     theta = np.stack([np.interp(time, motion.time, column) for column in motion.theta.T], axis=1)

@@ -10,7 +10,7 @@ import numpy as np
 
 from reojax._internal.arrays import Array
 from reojax.robot import Robot
-from reojax.robots.prototype import with_end_inertia
+from reojax.robots.edits import with_end_inertia
 
 UNITS = {
     "mass": "kg",
@@ -76,11 +76,11 @@ def _common(robot: Robot, field: str) -> Parameter:
     if not values.size or not (values == values[0]).all():
         raise ValueError(f"the joints of {robot.name!r} differ in {field}; fit {field}[0] and so on one by one.")
     start = float(values[0])
-    return Parameter(field, start, _put_common(field), UNITS[field], abs(start) or 1.0, start > 0)
+    return Parameter(field, start, _set_all(field), UNITS[field], abs(start) or 1.0, start > 0)
 
 
 @cache
-def _put_common(field: str) -> Put:
+def _set_all(field: str) -> Put:
     """One function per field, so that what is compiled for it is found again."""
     return lambda robot, value: robot.replace(**{field: jnp.broadcast_to(value, (robot.joints,))})
 
@@ -93,11 +93,11 @@ def _entry(robot: Robot, name: str, field: str, index: tuple[int, ...]) -> Param
     size = float(np.abs(values).max())
     diagonal = field == "inertia" and index[1] == index[2]
     positive = start > 0 and (field in ("mass", "rotor_inertia") or diagonal)
-    return Parameter(name, start, _put_entry(field, index), UNITS[field], size or 1.0, positive)
+    return Parameter(name, start, _set_entry(field, index), UNITS[field], size or 1.0, positive)
 
 
 @cache
-def _put_entry(field: str, index: tuple[int, ...]) -> Put:
+def _set_entry(field: str, index: tuple[int, ...]) -> Put:
     places = {index, (index[0], *index[:0:-1])} if field == "inertia" else {index}
 
     def put(robot: Robot, value: Array) -> Robot:
@@ -109,7 +109,7 @@ def _put_entry(field: str, index: tuple[int, ...]) -> Put:
     return put
 
 
-def chosen(robot: Robot, parameters: object) -> tuple[Parameter, ...]:
+def resolve(robot: Robot, parameters: object) -> tuple[Parameter, ...]:
     """Return the parameters of a list of names and `Parameter`s.
 
     Raises:

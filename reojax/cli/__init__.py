@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 
 from reojax.cli import compare, export, merge, plan, simulate, sweep, time
-from reojax.cli._arguments import BadInput, Parser, joined, version
+from reojax.cli._arguments import BadInput, Parser, join_negative_values, version
 
 COMMANDS = {
     "simulate": simulate,
@@ -28,7 +28,7 @@ COMMANDS = {
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line with `argv` (default: the process's arguments) and return its exit status."""
     try:
-        args = _parser().parse_args(joined(sys.argv[1:] if argv is None else argv))
+        args = _parser().parse_args(join_negative_values(sys.argv[1:] if argv is None else argv))
         args.run(args)
         sys.stdout.flush()
     except BadInput as error:

@@ -37,7 +37,7 @@ def degrees(text: str) -> float:
     return angle
 
 
-def joined(arguments: Sequence[str]) -> list[str]:
+def join_negative_values(arguments: Sequence[str]) -> list[str]:
     """Join options to negative numbers after them, of which argparse knows only some: `--bend=-1e2`."""
     result: list[str] = []
     for argument in arguments:

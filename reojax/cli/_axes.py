@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from reojax._internal.display_units import shown
+from reojax._internal.display_units import display_unit
 from reojax.cli._arguments import LARGEST_ANGLE
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Axis(NamedTuple):
         import numpy as np
 
         given = np.linspace(*self.ends, self.size) if self.listed is None else np.array(self.listed)
-        return given / shown(AXES[self.name].unit)[1]
+        return given / display_unit(AXES[self.name].unit)[1]
 
 
 def axis(text: str) -> Axis:
@@ -93,6 +93,6 @@ def _number(name: str, text: str) -> float:
     unit, least, most = AXES[name]
     if not least <= number <= most:  # nor is NaN between them
         raise argparse.ArgumentTypeError(
-            f"axis {name!r}: {text!r} is not between {least:g} and {most:g} {shown(unit)[0]}".rstrip()
+            f"axis {name!r}: {text!r} is not between {least:g} and {most:g} {display_unit(unit)[0]}".rstrip()
         )
     return number

@@ -28,18 +28,19 @@ def path_of(robot: "Robot", args: argparse.Namespace) -> "Path":
     """
     import numpy as np
 
-    from reojax.manoeuvres import layout_for, manoeuvre_a, manoeuvre_b
+    from reojax.manoeuvres import manoeuvre_a, manoeuvre_b
+    from reojax.robot import layout_of
 
     manoeuvre = {"a": manoeuvre_a, "b": manoeuvre_b}[args.manoeuvre]
-    return manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), layout_for(robot))
+    return manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), layout_of(robot))
 
 
 def edge_names(robot: "Robot") -> tuple[str, ...]:
     """What the robot does on each edge of a manoeuvre."""
-    from reojax.manoeuvres import layout_for
+    from reojax.robot import layout_of
 
     names = ("bend", "twist", "unbend", "untwist")
-    return names if layout_for(robot).fold is None else ("fold", *names, "unfold")
+    return names if layout_of(robot).fold is None else ("fold", *names, "unfold")
 
 
 def heading(args: argparse.Namespace) -> str:

@@ -25,12 +25,12 @@ def add_motors(parser: argparse.ArgumentParser, *, law: str | None) -> None:
 
 def volts(text: str) -> float:
     """Read a supply voltage (an argparse type)."""
-    return _between(text, "a supply voltage", WEAKEST, 1e4)
+    return in_range(text, "a supply voltage", WEAKEST, 1e4)
 
 
 def seconds(text: str) -> float:
     """Read a duration (an argparse type)."""
-    return _between(text, "a duration in seconds", SHORTEST, LONGEST)
+    return in_range(text, "a duration in seconds", SHORTEST, LONGEST)
 
 
 def momentum(text: str) -> list[float]:
@@ -51,7 +51,7 @@ def motor_at(supply: float) -> "Motor":
     return RE_MAX_17._replace(supply=supply)
 
 
-def _between(text: str, what: str, least: float, most: float) -> float:
+def in_range(text: str, what: str, least: float, most: float) -> float:
     try:
         number = float(text)
     except ValueError:

@@ -22,7 +22,7 @@ def add_plan(parser: argparse.ArgumentParser, *, manoeuvre: str | None) -> None:
     add("--duration", type=_durations, metavar="S[,S...]", help="seconds of each edge, or one number for all")
 
 
-def planned(robot: "Robot", args: argparse.Namespace) -> "Trajectory":
+def plan_motion(robot: "Robot", args: argparse.Namespace) -> "Trajectory":
     """Trajectory of the joints that the options ask for.
 
     Raises:
@@ -30,13 +30,14 @@ def planned(robot: "Robot", args: argparse.Namespace) -> "Trajectory":
     """
     import numpy as np
 
-    from reojax.manoeuvres import layout_for, manoeuvre_a, manoeuvre_b
+    from reojax.manoeuvres import manoeuvre_a, manoeuvre_b
     from reojax.motion.trajectory import along
+    from reojax.robot import layout_of
 
     if args.duration is None:
         raise ValueError("--duration is missing: seconds for each edge of the manoeuvre, or one number for all.")
     manoeuvre = {"a": manoeuvre_a, "b": manoeuvre_b}[args.manoeuvre]
-    path = manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), layout_for(robot))
+    path = manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), layout_of(robot))
     durations = args.duration[0] if len(args.duration) == 1 else np.array(args.duration)
     return along(path, args.law, durations)
 

@@ -4,7 +4,7 @@ import argparse
 from math import prod
 from typing import TYPE_CHECKING, Any
 
-from reojax._internal.display_units import shown
+from reojax._internal.display_units import display_unit
 
 if TYPE_CHECKING:
     from reojax.sweeps import Sweep
@@ -82,7 +82,7 @@ def _extremes(found: "Sweep", name: str) -> dict[str, Any]:
     import numpy as np
 
     values = found.arrays()[name]
-    unit, scale = shown(found.units.get(name, ""))
+    unit, scale = display_unit(found.units.get(name, ""))
     ends = {}
     for end, pick in (("least", np.nanargmin), ("most", np.nanargmax)):
         finite = np.where(np.isfinite(values), values, np.nan).ravel()
@@ -95,4 +95,6 @@ def _extremes(found: "Sweep", name: str) -> dict[str, Any]:
 
 
 def _where(found: "Sweep", design: dict[str, float]) -> str:
-    return ", ".join(f"{name} {value * shown(found.units.get(name, ''))[1]:.6g}" for name, value in design.items())
+    return ", ".join(
+        f"{name} {value * display_unit(found.units.get(name, ''))[1]:.6g}" for name, value in design.items()
+    )

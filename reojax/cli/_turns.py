@@ -8,10 +8,10 @@ import numpy as np
 
 from reojax import so3
 from reojax._internal.arrays import Array
-from reojax.manoeuvres import layout_for, manoeuvre_a, manoeuvre_b
+from reojax.manoeuvres import manoeuvre_a, manoeuvre_b
 from reojax.mechanics.holonomy import DEFAULT_STEPS, rotation_history
 from reojax.path import joint_travel
-from reojax.robot import Robot
+from reojax.robot import Robot, layout_of
 from reojax.robots import with_end_inertia, with_gear_ratio, with_rotor_inertia
 
 _RESOLVED = np.deg2rad(270)
@@ -42,7 +42,7 @@ def turn_function(
     Raises:
         ValueError: if the robot has no layout for the manoeuvres.
     """
-    layout = layout_for(robot)
+    layout = layout_of(robot)
     longest = max(float(np.abs(values).max()) for values in amplitudes.values())
     samples = DEFAULT_STEPS * max(1, int(np.ceil(longest / _RESOLVED - 1e-9)))
     fixed = {name: values[0] for name, values in amplitudes.items()}

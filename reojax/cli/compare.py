@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, version
-from reojax.cli._planned import add_plan, planned
+from reojax.cli._planned import add_plan, plan_motion
 
 if TYPE_CHECKING:
     from reojax.captures.calibration import Calibration
@@ -113,7 +113,7 @@ def _motion(robot: "Robot", args: argparse.Namespace) -> tuple["Sampled | None",
     from reojax.captures.comparison import Sampled
     from reojax.motion.release import released
 
-    trajectory = planned(robot, args)
+    trajectory = plan_motion(robot, args)
     motion = released(robot, trajectory, steps=64)
     theta = jax.vmap(trajectory.at)(motion.time).theta
     name = f"manoeuvre {args.manoeuvre.upper()}, twist {args.twist:g} deg, bend {args.bend:g} deg, {args.law}"
@@ -178,7 +178,7 @@ def _text(report: dict[str, Any]) -> str:
         turned = f"measured {math.degrees(measured):.2f} deg, simulated {math.degrees(simulated):.2f} deg"
         lines += ["", f"roll at the end: {turned}"]
     if r["calibration"] is not None:
-        lines += ["", *_fitted(r["calibration"])]
+        lines += ["", *_fit_text(r["calibration"])]
     if r["picture"] is not None:
         lines += ["", f"picture in {r['picture']}"]
     return "\n".join(lines)
@@ -189,7 +189,7 @@ def _rows(names: list[str], values: list[float | None]) -> list[str]:
     return [f"  {name:<16}{x:9.4f} rad {math.degrees(x):9.3f} deg" for name, x in pairs if x is not None]
 
 
-def _fitted(fit: dict[str, Any]) -> list[str]:
+def _fit_text(fit: dict[str, Any]) -> list[str]:
     lines = [f"calibration{'' if fit['converged'] else ', NOT converged'}"]
     for name, unit, start, value, std in zip(
         *(fit[key] for key in ("parameters", "units", "start", "values", "std")), strict=True

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, version
-from reojax.cli._planned import add_plan, planned
+from reojax.cli._planned import add_plan, plan_motion
 
 if TYPE_CHECKING:
     from reojax.robot import Robot
@@ -49,7 +49,7 @@ def _write(robot: "Robot", args: argparse.Namespace) -> dict[str, Any]:
     from reojax.files.trajectories import write_trajectory
     from reojax.mechanics.dynamics import inverse_dynamics
 
-    trajectory = planned(robot, args)
+    trajectory = plan_motion(robot, args)
     duration = float(trajectory.duration)
     steps = math.ceil(duration * args.rate - 1e-9)
     if steps >= LARGEST:

@@ -77,7 +77,7 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
 
     from reojax import so3
     from reojax.mechanics.attitude import tilt_and_roll
-    from reojax.mechanics.certificate import DEFAULT_SAMPLES, certified_rotation
+    from reojax.mechanics.certificate import DEFAULT_SAMPLES, certify_rotation
     from reojax.mechanics.holonomy import DEFAULT_STEPS
 
     longest = np.rad2deg(np.abs(np.diff(path.waypoints, axis=0)).max())
@@ -86,7 +86,7 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
 
     @jax.jit
     def compute(path: "Path") -> tuple[Any, ...]:  # one program to compile; the robot is constant in it
-        certificate, rotation, history = certified_rotation(robot, path, steps=steps, samples=samples)
+        certificate, rotation, history = certify_rotation(robot, path, steps=steps, samples=samples)
         read = (so3.log, so3.to_euler_zxz, so3.angle, so3.to_quaternion)
         return certificate, history, rotation, *(function(rotation) for function in read)
 

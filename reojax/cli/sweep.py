@@ -6,7 +6,7 @@ import re
 import sys
 from math import prod
 
-from reojax._internal.display_units import shown
+from reojax._internal.display_units import display_unit
 from reojax.cli._arguments import BadInput, degrees
 from reojax.cli._axes import AXES, axis, check_names
 from reojax.cli._results import add_files, check_files, complaint, table, write
@@ -18,7 +18,7 @@ OUTPUTS = ("roll", "off_axis", "angle", "travel")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `reojax sweep`."""
     add = parser.add_argument
-    units = ((name, shown(unit)[0]) for name, (unit, *_) in AXES.items())
+    units = ((name, display_unit(unit)[0]) for name, (unit, *_) in AXES.items())
     names = ", ".join(f"{name} [{unit}]" if unit else name for name, unit in units)
     add("axes", nargs="+", type=axis, metavar="AXIS", help=f"NAME=START:STOP:COUNT or NAME=VALUE,VALUE,...: {names}")
     add("--robot", default="prototype", metavar="NAME", help="robot; a wrong name lists them [%(default)s]")
@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> None:
 
     from reojax import robots, session
     from reojax.cli._turns import turn_function
-    from reojax.sweeps.sweep import computed
+    from reojax.sweeps.sweep import run_sweep
 
     session.start()
     session.one_device_per_core()
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> None:
         function = turn_function(robots.by_name(args.robot), args.manoeuvre, args.outputs, amplitudes)
         units = {name: AXES[name].unit for name in axes if AXES[name].unit} | dict.fromkeys(args.outputs, "rad")
         options = (args.chunk_size, args.store, args.devices, not args.quiet, units, args.shard)
-        found = computed(function, axes, *options)
+        found = run_sweep(function, axes, *options)
         if jax.process_index() == 0:
             if args.shard is not None or not (args.out or args.picture or args.store is None):
                 report = {"store": args.store, "shard": args.shard, "bad": len(found.bad)}

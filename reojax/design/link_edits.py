@@ -24,7 +24,7 @@ def with_mass(robot: Robot, link: int, mass: ArrayLike) -> Robot:
     index, wanted = _link(robot, link), _positive("mass", mass)
     share = wanted / robot.mass[index]
     return robot.replace(
-        mass=_put(robot.mass, index, wanted), inertia=_put(robot.inertia, index, share * robot.inertia[index])
+        mass=_set_link(robot.mass, index, wanted), inertia=_set_link(robot.inertia, index, share * robot.inertia[index])
     )
 
 
@@ -37,7 +37,7 @@ def with_com_offset(robot: Robot, link: int, offset: ArrayLike) -> Robot:
     index, move = _link(robot, link), as_numbers("offset", offset)
     if move.shape != (3,):
         raise ValueError(f"`offset` has shape {move.shape}; it must be (3,), in m.")
-    return robot.replace(com=_put(robot.com, index, robot.com[index] + move))
+    return robot.replace(com=_set_link(robot.com, index, robot.com[index] + move))
 
 
 def with_length(robot: Robot, link: int, factor: ArrayLike, *, along: ArrayLike | None = None) -> Robot:
@@ -60,7 +60,7 @@ def with_length(robot: Robot, link: int, factor: ArrayLike, *, along: ArrayLike 
             raise ValueError(f"`along` is {along!r}; it must be (3,), finite and not zero.")
         share = np.outer(direction, direction) / (direction @ direction)
     stretch = jnp.eye(3, dtype=jnp.result_type(scale)) + (scale - 1) * share
-    robot = _stretched(robot, index, stretch, jnp.zeros(3, stretch.dtype))
+    robot = _stretch(robot, index, stretch, jnp.zeros(3, stretch.dtype))
     carried = np.array([parent == index for parent in robot.parent])[:, None]
     return robot.replace(anchor=jnp.where(carried, robot.anchor @ stretch, robot.anchor))
 
@@ -80,22 +80,22 @@ def with_joint_inertia(robot: Robot, joint: int, inertia: ArrayLike) -> Robot:
     along = axis[:, None] * axis[None, :]
     across = np.eye(3, dtype=along.dtype) - along
     present = (along * robot.inertia[link]).sum() + robot.mass[link] * (com @ across @ com)
-    return _stretched(robot, link, jnp.sqrt(wanted / present) * across + along, jnp.zeros_like(com))
+    return _stretch(robot, link, jnp.sqrt(wanted / present) * across + along, jnp.zeros_like(com))
 
 
-def _stretched(robot: Robot, link: int, stretch: jax.Array, fixed: jax.Array) -> Robot:
+def _stretch(robot: Robot, link: int, stretch: jax.Array, fixed: jax.Array) -> Robot:
     """Stretch a link's body about the point `fixed`."""
     inertia = robot.inertia[link]
     spread = 0.5 * jnp.trace(jnp.asarray(inertia)) * jnp.eye(3, dtype=inertia.dtype) - inertia
     spread = stretch @ spread @ stretch.T
     after = jnp.trace(spread) * jnp.eye(3, dtype=spread.dtype) - spread
     return robot.replace(
-        com=_put(robot.com, link, fixed + stretch @ (robot.com[link] - fixed)),
-        inertia=_put(robot.inertia, link, after),
+        com=_set_link(robot.com, link, fixed + stretch @ (robot.com[link] - fixed)),
+        inertia=_set_link(robot.inertia, link, after),
     )
 
 
-def _put(array: Any, index: int, value: Any) -> jax.Array:
+def _set_link(array: Any, index: int, value: Any) -> jax.Array:
     return jnp.asarray(array).at[index].set(value)
 
 

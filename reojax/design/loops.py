@@ -18,9 +18,9 @@ from numpy.typing import ArrayLike
 from reojax._internal.arrays import Array
 from reojax._internal.robot_checks import numbers
 from reojax.design.variables import Variable
-from reojax.manoeuvres import Layout, layout_for
+from reojax.manoeuvres import Layout
 from reojax.path import Path
-from reojax.robot import Robot
+from reojax.robot import Robot, layout_of
 
 
 class Loops(NamedTuple):
@@ -51,7 +51,7 @@ def rectangles(
 
     Args:
         robot: its limits are kept.
-        layout: which joints bend and twist; default by `layout_for`. Folding is left out.
+        layout: which joints bend and twist; default the robot's own. Folding is left out.
         start: number or (j,), where the loops begin and end [rad].
         lead: whether a straight edge may lead from `start` to the rectangle, and back.
         name: name of the coefficients.
@@ -59,7 +59,7 @@ def rectangles(
     Raises:
         ValueError: for a start outside of the joint limits, a joint without limits, or no layout.
     """
-    layout = layout_for(robot) if layout is None else layout
+    layout = layout_of(robot) if layout is None else layout
     order = [(layout.bend,), layout.twist]
     edges = np.zeros((4, robot.joints, 3))
     for edge, (side, sign) in enumerate(((0, 1), (1, 1), (0, -1), (1, -1))):

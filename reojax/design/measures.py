@@ -122,7 +122,7 @@ def value_of(name: str) -> Measure:
     return lambda outcome: outcome.values[name]
 
 
-def weighted(parts: Mapping[Measure, float]) -> Measure:
+def weigh(parts: Mapping[Measure, float]) -> Measure:
     """Sum of measures, each times its weight."""
 
     def measure(outcome: Outcome) -> Array:

@@ -77,7 +77,7 @@ class Problem:
         def cost(x: Array) -> Array:
             return objective(self.outcome(x))
 
-        def gathered(measures: Sequence[Measure], conditions: str) -> Callable[[Array], Array]:
+        def gather(measures: Sequence[Measure], conditions: str) -> Callable[[Array], Array]:
             def function(x: Array) -> Array:
                 outcome = self.outcome(x)
                 parts = [measure(outcome) for measure in measures]
@@ -87,7 +87,7 @@ class Problem:
             return function
 
         self.cost = cost
-        self.equality, self.inequality = gathered(equality, "equality"), gathered(inequality, "inequality")
+        self.equality, self.inequality = gather(equality, "equality"), gather(inequality, "inequality")
 
     def outcome(self, x: Array) -> Outcome:
         """Outcome of a design as a vector (n,) in SI."""

@@ -50,7 +50,7 @@ def fourier_loops(robot: Robot, degree: int, *, samples: int = 64, start: ArrayL
 
     dense = basis(_OVERSAMPLING * degree)
     bound = np.repeat(half[None], 2 * degree, axis=0).ravel()
-    loops = _sampled(f"Fourier loop of degree {degree}", robot, origin, basis(samples), np.tile(half, 2 * degree), name)
+    loops = _sample(f"Fourier loop of degree {degree}", robot, origin, basis(samples), np.tile(half, 2 * degree), name)
 
     def inequality(x: Array) -> Array:
         points = jnp.asarray(dense, x.dtype) @ x.reshape(2 * degree, -1) + jnp.asarray(origin - middle, x.dtype)[None]
@@ -91,7 +91,7 @@ def spline_loops(robot: Robot, points: int, *, samples: int = 64, start: ArrayLi
     near, far = (4 - 6 * distance**2 + 3 * distance**3) / 6, np.maximum(2 - distance, 0) ** 3 / 6
     weights = np.where(distance < 1, near, far)
     spread = np.repeat(np.maximum(high - origin, origin - low)[None], points, axis=0).ravel()
-    loops = _sampled(f"spline of {points} points", robot, origin, weights, spread, name)
+    loops = _sample(f"spline of {points} points", robot, origin, weights, spread, name)
     lower, upper = np.tile(low - origin, points), np.tile(high - origin, points)
 
     def equality(x: Array) -> Array:
@@ -103,7 +103,7 @@ def spline_loops(robot: Robot, points: int, *, samples: int = 64, start: ArrayLi
     return loops._replace(variable=Variable(name, lower, upper, "rad"), equality=equality, random=random)
 
 
-def _sampled(kind: str, robot: Robot, origin: np.ndarray, basis: np.ndarray, bound: np.ndarray, name: str) -> Loops:
+def _sample(kind: str, robot: Robot, origin: np.ndarray, basis: np.ndarray, bound: np.ndarray, name: str) -> Loops:
     """Loops whose points are `origin + basis @ coefficients`, without further conditions."""
 
     def shape(x: Array) -> Array:
@@ -121,10 +121,10 @@ def _sampled(kind: str, robot: Robot, origin: np.ndarray, basis: np.ndarray, bou
     def nothing(x: Array) -> Array:
         return jnp.zeros(0, x.dtype)
 
-    def unset(rng: np.random.Generator, starts: int) -> np.ndarray:
+    def without_scale(rng: np.random.Generator, starts: int) -> np.ndarray:
         return np.zeros((starts, basis.shape[1] * robot.joints))
 
-    return Loops(kind, Variable(name, -bound, bound, "rad"), path, travel, nothing, nothing, unset)
+    return Loops(kind, Variable(name, -bound, bound, "rad"), path, travel, nothing, nothing, without_scale)
 
 
 def _positive(entry: str, value: int, least: int) -> None:

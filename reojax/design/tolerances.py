@@ -57,7 +57,7 @@ def sources_of(robot: Robot, tolerances: Mapping[str, ArrayLike]) -> Sources:
     return Sources(tuple(names), tuple(deviations), tuple(fields))
 
 
-def perturbed(robot: Robot, sources: Sources, errors: Float[Array, " k"]) -> Robot:
+def perturb(robot: Robot, sources: Sources, errors: Float[Array, " k"]) -> Robot:
     """The robot with errors given in standard deviations. Its links stay possible rigid bodies at any errors.
 
     Relative errors are factors exp(deviation * error). An error of a mass takes the link's inertia with it.
@@ -77,7 +77,7 @@ def perturbed(robot: Robot, sources: Sources, errors: Float[Array, " k"]) -> Rob
         if field in ("com", "anchor"):
             changed[field] = value(field) + part
         elif field == "axis":
-            changed[field] = _tilted(value(field), part)
+            changed[field] = _tilt(value(field), part)
         elif field == "inertia":
             changed[field] = value(field) * factor[:, None, None]
         else:
@@ -95,7 +95,7 @@ def across(axis: Array) -> Array:
     return jnp.stack([first, jnp.cross(jnp.asarray(axis), first)])
 
 
-def _tilted(axes: Array, tilts: Array) -> Array:
+def _tilt(axes: Array, tilts: Array) -> Array:
     rows = []
     for axis, tilt in zip(axes, tilts, strict=True):
         unit = axis / jnp.sqrt(axis @ axis)

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from reojax import so3
 from reojax._internal.arrays import Array
-from reojax.design.tolerances import Sources, across, perturbed, sources_of
+from reojax.design.tolerances import Sources, across, perturb, sources_of
 from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation
 from reojax.path import Path
 from reojax.robot import Robot
@@ -148,7 +148,7 @@ def spread(
     errors = np.random.default_rng(seed).normal(size=(samples, len(sources.name)))
 
     def turn(**error: Array) -> Array:
-        other = perturbed(robot, sources, jnp.stack([error[f"e{i}"] for i in range(len(sources.name))]))
+        other = perturb(robot, sources, jnp.stack([error[f"e{i}"] for i in range(len(sources.name))]))
         return so3.log(net_rotation(other, path, steps=steps) @ nominal.T)
 
     columns = {f"e{i}": errors[:, i] for i in range(len(sources.name))}
@@ -177,7 +177,7 @@ def scatter(robot: Robot, path: Path, tolerances: Mapping[str, ArrayLike], *, st
     """
     sources, step = sources_of(robot, tolerances), 1e-2
     errors = step * jnp.concatenate([jnp.eye(len(sources.name)), -jnp.eye(len(sources.name))])
-    turned = jax.vmap(lambda error: net_rotation(perturbed(robot, sources, error), path, steps=steps))(errors)
+    turned = jax.vmap(lambda error: net_rotation(perturb(robot, sources, error), path, steps=steps))(errors)
     plus, minus = jnp.split(turned, 2)
     turns = jax.vmap(lambda a, b: so3.log(a @ b.T))(plus, minus)
     return ((turns / (2 * step)) ** 2).sum()
@@ -195,7 +195,7 @@ def _jacobian(robot: Robot, path: Path, sources: Sources, steps: int) -> Array:
     nominal = net_rotation(robot, path, steps=steps)
 
     def turn(error: Array) -> Array:
-        return so3.log(net_rotation(perturbed(robot, sources, error), path, steps=steps) @ nominal.T)
+        return so3.log(net_rotation(perturb(robot, sources, error), path, steps=steps) @ nominal.T)
 
     return jax.jacrev(turn)(jnp.zeros(len(sources.name), nominal.dtype))
 

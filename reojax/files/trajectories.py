@@ -111,12 +111,12 @@ def _csv(robot: Robot, time: np.ndarray, arrays: dict[str, np.ndarray]) -> str:
     header = ["time [s]"]
     header += [f"{units[key][0]}{name} [{units[key][1]}]" for key in arrays for name in robot.joint_names]
     rows = np.concatenate([time[:, None], *arrays.values()], axis=1)
-    lines = [",".join(_quoted(cell) for cell in header)]
+    lines = [",".join(_quote(cell) for cell in header)]
     lines += [",".join(f"{x:.12g}" for x in row) for row in rows]
     return "\n".join(lines) + "\n"
 
 
-def _quoted(cell: str) -> str:
+def _quote(cell: str) -> str:
     return '"' + cell.replace('"', '""') + '"' if any(mark in cell for mark in ',"\n') else cell
 
 

@@ -49,7 +49,7 @@ def rotors(robot: Robot) -> Iterator[Rotor]:
             )
 
 
-def driven_model(robot: Robot, model: Any, first: dict[int, int], geared: list[tuple[int, Rotor]]) -> Foreign:
+def tie_hinges(robot: Robot, model: Any, first: dict[int, int], geared: list[tuple[int, Rotor]]) -> Foreign:
     """`first[k]`: velocity index of joint k; `geared`: velocity index of each rotor."""
     drive = np.zeros((model.nv, 6 + robot.joints))
     drive[:6, :6] = np.eye(6)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from reojax.interop.foreign import Foreign, configuration, driven_model, rotors
+from reojax.interop.foreign import Foreign, configuration, rotors, tie_hinges
 from reojax.robot import Robot
 
 
@@ -26,7 +26,7 @@ def mujoco_model(robot: Robot) -> Foreign:
         place = np.asarray(robot.com[i]) + 0.03 * rotor.axis + [0.0, 0.01, -0.02]
         disc = (1e-3 * float(robot.mass[i]), place, rotor.inertia * (0.4 * axial + 0.6 * np.eye(3)))
         discs.append(disc)
-        mass[i], com[i], inertia[i] = _without((mass[i], com[i], inertia[i]), disc)
+        mass[i], com[i], inertia[i] = _subtract((mass[i], com[i], inertia[i]), disc)
 
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
@@ -46,7 +46,7 @@ def mujoco_model(robot: Robot) -> Foreign:
     model = spec.compile()
     first = {k: int(model.joint(name).dofadr[0]) for k, name in enumerate(robot.joint_names)}
     geared = [(int(model.joint(f"rotor{rotor.joint}").dofadr[0]), rotor) for rotor in rotors(robot)]
-    return driven_model(robot, model, first, geared)
+    return tie_hinges(robot, model, first, geared)
 
 
 def mujoco_momentum(foreign: Foreign, theta: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
@@ -76,7 +76,7 @@ def _weigh(body: Any, mass: float, com: np.ndarray, inertia: np.ndarray) -> None
     body.inertia, body.iquat = moments, quaternion
 
 
-def _without(whole: tuple, part: tuple) -> tuple[float, np.ndarray, np.ndarray]:
+def _subtract(whole: tuple, part: tuple) -> tuple[float, np.ndarray, np.ndarray]:
     """Mass, centre of mass and inertia of `whole` without its `part`, by the parallel axis theorem."""
     mass = whole[0] - part[0]
     com = (whole[0] * whole[1] - part[0] * part[1]) / mass

@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from reojax.interop.foreign import Foreign, configuration, driven_model, rotors
+from reojax.interop.foreign import Foreign, configuration, rotors, tie_hinges
 from reojax.robot import Robot
 
 
@@ -32,7 +32,7 @@ def pinocchio_model(robot: Robot) -> Foreign:
         wheel = pin.Inertia(0.0, np.zeros(3), rotor.inertia * np.outer(rotor.axis, rotor.axis))
         model.appendBodyToJoint(spinner, wheel, pin.SE3.Identity())
         geared.append((model.idx_vs[spinner], rotor))
-    return driven_model(robot, model, {k: model.idx_vs[body[k + 1]] for k in range(robot.joints)}, geared)
+    return tie_hinges(robot, model, {k: model.idx_vs[body[k + 1]] for k in range(robot.joints)}, geared)
 
 
 def pinocchio_momentum(foreign: Foreign, theta: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:

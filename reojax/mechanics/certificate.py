@@ -65,10 +65,10 @@ def certify(robot: Robot, path: Path, *, steps: int = DEFAULT_STEPS, samples: in
         ValueError: if the path's joints do not match the robot's, `steps` is not a positive integer, or
             `samples` is not an integer of at least `WINDOW - 1`.
     """
-    return certified_rotation(robot, path, steps=steps, samples=samples)[0]
+    return certify_rotation(robot, path, steps=steps, samples=samples)[0]
 
 
-def certified_rotation(
+def certify_rotation(
     robot: Robot, path: Path, *, steps: int = DEFAULT_STEPS, samples: int = DEFAULT_SAMPLES
 ) -> tuple[Certificate, Float[Array, "3 3"], Float[Array, "m 3 3"]]:
     """Return the certificate with the net rotation and the history that it is about; see `certify`."""

@@ -25,7 +25,7 @@ from jaxtyping import Float
 
 from reojax._internal.arrays import Array
 from reojax._internal.linalg import solve_positive, solve_symmetric3
-from reojax.mechanics.kinematics import Kinematics, checked, kinematics, support_mask
+from reojax.mechanics.kinematics import Kinematics, check_motion, kinematics, support_mask
 from reojax.mechanics.momentum import inertia_in_base_frame, momentum_matrices_of_pose, rotor_spin
 from reojax.robot import Robot
 
@@ -82,7 +82,7 @@ def joint_load(
 
     Arguments and errors as for `inverse_dynamics`.
     """
-    robot, theta, theta_dot, theta_ddot, h = checked(
+    robot, theta, theta_dot, theta_ddot, h = check_motion(
         robot, theta=theta, theta_dot=theta_dot, theta_ddot=theta_ddot, momentum=_or_zero(momentum)
     )
     pose = kinematics(robot, theta)
@@ -127,7 +127,7 @@ def forward_dynamics(
     Raises:
         ValueError: if an argument has the wrong shape or is not finite.
     """
-    robot, theta, theta_dot, torque, h = checked(
+    robot, theta, theta_dot, torque, h = check_motion(
         robot, theta=theta, theta_dot=theta_dot, torque=torque, momentum=_or_zero(momentum)
     )
     still = joint_load(robot, theta, theta_dot, jnp.zeros_like(theta), momentum=h).torque
@@ -142,10 +142,10 @@ def joint_inertia(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "j j"
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
-    robot, theta = checked(robot, theta=theta)
+    robot, theta = check_motion(robot, theta=theta)
     pose = kinematics(robot, theta)
     A, B = momentum_matrices_of_pose(robot, pose)
-    return _fixed_inertia(robot, pose) - B.T @ solve_symmetric3(A, B)
+    return _fixed_base_inertia(robot, pose) - B.T @ solve_symmetric3(A, B)
 
 
 def base_velocity(
@@ -174,7 +174,7 @@ def kinetic_energy(
     Arguments and errors as for `inverse_dynamics`.
     """
     robot, theta_dot, pose, A, B, omega = _base(robot, theta, theta_dot, momentum)
-    joints = theta_dot @ _fixed_inertia(robot, pose) @ theta_dot
+    joints = theta_dot @ _fixed_base_inertia(robot, pose) @ theta_dot
     return 0.5 * (omega @ (A @ omega) + joints) - omega @ (B @ theta_dot)
 
 
@@ -182,7 +182,7 @@ def _base(
     robot: Robot, theta: Any, theta_dot: Any, momentum: Any
 ) -> tuple[Robot, Array, Kinematics, Array, Array, Array]:
     """The checked robot and joint rates, the pose, `A`, `B`, and the base's angular velocity."""
-    robot, theta, theta_dot, h = checked(robot, theta=theta, theta_dot=theta_dot, momentum=_or_zero(momentum))
+    robot, theta, theta_dot, h = check_motion(robot, theta=theta, theta_dot=theta_dot, momentum=_or_zero(momentum))
     pose = kinematics(robot, theta)
     A, B = momentum_matrices_of_pose(robot, pose)
     return robot, theta_dot, pose, A, B, solve_symmetric3(A, (B @ theta_dot + h)[:, None])[:, 0]
@@ -198,7 +198,7 @@ def _stator(robot: Robot) -> np.ndarray:
     return np.array([p if side == "parent" else k + 1 for k, (p, side) in enumerate(pairs)], int)
 
 
-def _fixed_inertia(robot: Robot, pose: Kinematics) -> Array:
+def _fixed_base_inertia(robot: Robot, pose: Kinematics) -> Array:
     """`D`: inertia that the joints feel while the base does not turn."""
     spin, stator = rotor_spin(robot), _stator(robot)
     links = jnp.einsum("iak,iab,ibl->kl", pose.turn, inertia_in_base_frame(robot, pose), pose.turn)

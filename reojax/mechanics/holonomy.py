@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from reojax._internal.arrays import Array, common_float
-from reojax.mechanics._fast.net_rotation import end_rotation, steps_of_path
+from reojax.mechanics._fast.net_rotation import net_rotation as fast_net_rotation, steps_of_path
 from reojax.mechanics._fast.parameters import Pattern, pattern_of
 from reojax.mechanics._fast.quaternions import products_up_to, to_matrix
 from reojax.path import Path
@@ -83,7 +83,7 @@ def _net_rotation(robot: Robot, waypoints: Array, steps: int, pattern: Pattern) 
     robot, points = _as_arrays(robot, waypoints)
     if points.shape[0] == 1 or not robot.joints:
         return jnp.eye(3, dtype=points.dtype)
-    return end_rotation(robot, pattern, points, steps)
+    return fast_net_rotation(robot, pattern, points, steps)
 
 
 @partial(jax.jit, static_argnums=(2, 3))

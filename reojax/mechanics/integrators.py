@@ -62,7 +62,7 @@ def orientations(
             index, row, a, m = inputs
             u = h * (row @ slopes)
             omega = a + _apply(m, _apply(so3.exp(-u), body))
-            return slopes.at[index].set(_untwisted(u, omega)), None
+            return slopes.at[index].set(_untwist(u, omega)), None
 
         every = (jnp.arange(len(_NODE)), stages, a[_NODE], m[_NODE])
         slopes, _ = jax.lax.scan(stage, jnp.zeros((len(_NODE), 3), own.dtype), every)
@@ -75,7 +75,7 @@ def orientations(
     return jnp.concatenate([first[None], rest])
 
 
-def _untwisted(u: Array, omega: Array) -> Array:
+def _untwist(u: Array, omega: Array) -> Array:
     """Rate of the rotation vector `u` of `exp(hat(u))` that turns at `omega`, in the turned frame."""
     square = u @ u
     factor = jnp.polyval(jnp.asarray(_SERIES[::-1], u.dtype), square)

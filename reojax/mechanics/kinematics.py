@@ -31,7 +31,7 @@ class Kinematics(NamedTuple):
     """Joint axes."""
 
 
-def checked(robot: Robot, **motion: Any) -> Any:
+def check_motion(robot: Robot, **motion: Any) -> Any:
     """Return the robot and the motion's vectors as arrays of one dtype, or raise a `ValueError`."""
     if not isinstance(robot, Robot):
         raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
@@ -60,7 +60,7 @@ def kinematics(robot: Robot, theta: Float[Array, " j"]) -> Kinematics:
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
-    robot, theta = checked(robot, theta=theta)
+    robot, theta = check_motion(robot, theta=theta)
     unit = robot.axis / jnp.sqrt((robot.axis * robot.axis).sum(1, keepdims=True))
     rotation = [jnp.eye(3, dtype=theta.dtype)]
     for p, turned in zip(robot.parent, jax.vmap(joint_rotation)(unit, theta), strict=True):

@@ -26,7 +26,7 @@ from jaxtyping import Float
 
 from reojax._internal.arrays import Array
 from reojax._internal.linalg import solve_symmetric3
-from reojax.mechanics.kinematics import Kinematics, checked, kinematics
+from reojax.mechanics.kinematics import Kinematics, check_motion, kinematics
 from reojax.robot import Robot
 from reojax.so3 import hat
 
@@ -53,7 +53,7 @@ def momentum_matrices(robot: Robot, theta: Float[Array, " j"]) -> MomentumMatric
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
-    robot, theta = checked(robot, theta=theta)
+    robot, theta = check_motion(robot, theta=theta)
     return momentum_matrices_of_pose(robot, kinematics(robot, theta))
 
 
@@ -103,6 +103,6 @@ def angular_momentum(
     Raises:
         ValueError: if an argument has the wrong shape or is not finite.
     """
-    robot, theta, theta_dot, omega = checked(robot, theta=theta, theta_dot=theta_dot, omega=omega)
+    robot, theta, theta_dot, omega = check_motion(robot, theta=theta, theta_dot=theta_dot, omega=omega)
     A, B = momentum_matrices(robot, theta)
     return A @ omega - B @ theta_dot

@@ -28,7 +28,7 @@ Look = Callable[[Any, Any], tuple[Any, Any]]
 """From unknowns (n,) and shares of the pieces (2, p, j) to numbers (r,) and their derivatives (r, n)."""
 
 
-def polished(
+def restore_feasibility(
     look: Look,
     build: Callable[[Any], Trajectory],
     miss: Callable[[Trajectory], Any],
@@ -56,7 +56,7 @@ def polished(
         value[equal:] += _CLEAR
         if np.abs(value[:equal]).max(initial=0) < 1e-12 and value[equal:].max(initial=0) <= 0:
             break
-        change = _least_change(value, slope * scale, equal, (lower - x) / scale, (upper - x) / scale)
+        change = least_norm_step(value, slope * scale, equal, (lower - x) / scale, (upper - x) / scale)
         x = np.clip(x + scale * change, lower, upper)
     return x
 
@@ -96,7 +96,9 @@ def farthest(trajectory: Trajectory) -> Float[np.ndarray, "2 p j"]:
     return share
 
 
-def _least_change(value: np.ndarray, slope: np.ndarray, equal: int, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+def least_norm_step(
+    value: np.ndarray, slope: np.ndarray, equal: int, lower: np.ndarray, upper: np.ndarray
+) -> np.ndarray:
     """Least change with `value + slope @ change` zero in the first `equal` rows and not positive in the others."""
     from scipy.optimize import minimize
 

@@ -16,11 +16,11 @@ from reojax import so3
 from reojax._internal.arrays import Array
 from reojax.mechanics.dynamics import joint_load
 from reojax.mechanics.integrators import GAUSS, end_rotation
-from reojax.motion._feasibility import Look, beyond, beyond_limits, limits, polished
+from reojax.motion._feasibility import Look, beyond, beyond_limits, limits, restore_feasibility
 from reojax.motion.least_time import minimum_stretch
 from reojax.motion.motor import Motor, demand, no_load_speed, per_joint, stall_torque
 from reojax.motion.simulation import net_rotation_of
-from reojax.motion.trajectory import Trajectory, polynomial, stretched
+from reojax.motion.trajectory import Trajectory, polynomial, stretch
 from reojax.optimisation.optimise import optimise
 from reojax.robot import Robot
 
@@ -69,7 +69,7 @@ class Task(NamedTuple):
     """Further numbers that must not be positive, linear in the unknowns."""
 
 
-class Box(NamedTuple):
+class UnknownBox(NamedTuple):
     """Least and largest values of the unknowns, and their scales, each (n,)."""
 
     lower: np.ndarray
@@ -77,7 +77,7 @@ class Box(NamedTuple):
     scale: np.ndarray
 
 
-def least_duration(task: Task, starts: np.ndarray, box: Box, max_steps: int, progress: str | None) -> Fastest:
+def least_duration(task: Task, starts: np.ndarray, box: UnknownBox, max_steps: int, progress: str | None) -> Fastest:
     """Solve a task from several starts, (m, n); the best answer is polished, and run as fast as its motors allow."""
     robot = jax.tree.map(lambda leaf: jnp.asarray(leaf, float), task.robot)
     motors = per_joint(task.motors, np.dtype(float))
@@ -92,7 +92,7 @@ def least_duration(task: Task, starts: np.ndarray, box: Box, max_steps: int, pro
         a, b, c = demand(robot, motors, theta_dot, load, soft=soft)
         return jnp.abs(a + b.sum(0) + c) / motors.supply - 1, load.omega
 
-    def sampled(x: Array) -> tuple[Array, Array]:
+    def sample(x: Array) -> tuple[Array, Array]:
         """What must not be positive, at the samples: motors, joints, order; and the net rotation."""
         trajectory = task.build(x)
         length = jnp.diff(trajectory.breaks)
@@ -109,7 +109,7 @@ def least_duration(task: Task, starts: np.ndarray, box: Box, max_steps: int, pro
     fine = jax.jit(lambda trajectory: so3.log(task.goal.T @ net_rotation_of(robot, trajectory, _FINE)))
     if task.kept:  # many rows and no curved ones: what the batched solver is better at
         found = optimise(
-            task.cost, starts, lower=box.lower, upper=box.upper, scale=box.scale, inequality=lambda x: sampled(x)[0],
+            task.cost, starts, lower=box.lower, upper=box.upper, scale=box.scale, inequality=lambda x: sample(x)[0],
             tolerance=1e-7, slope_tolerance=1e-4, max_steps=max_steps, progress=progress,
         )  # fmt: skip
         best, converged = np.asarray(found.value[found.best]), bool(found.converged[found.best])
@@ -117,7 +117,7 @@ def least_duration(task: Task, starts: np.ndarray, box: Box, max_steps: int, pro
     else:
 
         def everything(x: Array, share: Array) -> Array:
-            rows, turned = sampled(x)
+            rows, turned = sample(x)
             return jnp.concatenate([task.cost(x)[None], so3.log(task.goal.T @ turned), exact(x, share), rows])
 
         program, equal = _with_slope(everything), 3
@@ -125,9 +125,9 @@ def least_duration(task: Task, starts: np.ndarray, box: Box, max_steps: int, pro
         best, converged = _least(lambda x: program(x, halves), last, starts, box, max_steps, progress)
         look = lambda x, share: tuple(part[1:last] for part in program(x, share))
     if not task.kept or beyond(robot, build(best)) > _ROUNDING:
-        best = polished(look, build, fine, best, box, equal)
+        best = restore_feasibility(look, build, fine, best, box, equal)
     trajectory = build(best)
-    trajectory = stretched(trajectory, minimum_stretch(task.robot, trajectory, task.motors))
+    trajectory = stretch(trajectory, minimum_stretch(task.robot, trajectory, task.motors))
     error, past = jnp.linalg.norm(fine(trajectory)), beyond(robot, trajectory)
     past = past if past > _ROUNDING else 0.0  # a corner of a path may lie on a limit
     return Fastest(
@@ -153,7 +153,7 @@ def _least(
     program: Callable[[np.ndarray], tuple[Array, Array]],
     last: int,
     starts: np.ndarray,
-    box: Box,
+    box: UnknownBox,
     max_steps: int,
     progress: str | None,
 ) -> tuple[np.ndarray, bool]:

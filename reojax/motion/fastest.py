@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array, as_numbers
 from reojax.mechanics.holonomy import net_rotation
-from reojax.motion._optimal_control import Box, Fastest as Fastest, Task, least_duration
+from reojax.motion._optimal_control import Fastest as Fastest, Task, UnknownBox, least_duration
 from reojax.motion.least_time import minimum_time
 from reojax.motion.motor import Motor, check_motors
 from reojax.motion.time_laws import Law, quintic, trapezoid
-from reojax.motion.trajectory import Trajectory, along, overlapped, through
+from reojax.motion.trajectory import Trajectory, along, overlap_pieces, through
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -62,7 +62,7 @@ def overlap(
 
     def build(x: Array) -> Trajectory:
         share = x[2 * count : -1]
-        return overlapped(jnp.asarray(corners) * share[None], law, x[:count], x[count : 2 * count], moves)
+        return overlap_pieces(jnp.asarray(corners) * share[None], law, x[:count], x[count : 2 * count], moves)
 
     def order(x: Array) -> Array:
         begin, end = x[:count], x[:count] + x[count : 2 * count]
@@ -76,7 +76,7 @@ def overlap(
     scale = np.concatenate([np.full(2 * count, 0.2 * total), np.full(joints, 0.3), [total]])
     goal = net_rotation(robot, path)
     task = Task(robot, check_motors(motors, robot), goal, False, build, lambda x: x[-1], order)
-    return least_duration(task, first[None], Box(low, high, scale), max_steps, progress)
+    return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
 
 def free_law(
@@ -104,7 +104,7 @@ def free_law(
             through(Path(corners[e] + inner[e][:, None] * (corners[e + 1] - corners[e])[None]), x[e] / (points + 1))
             for e in range(edges)
         ]
-        return joined(parts)
+        return join(parts)
 
     durations = 1.2 * np.asarray(least.durations, float)
     first = np.concatenate([durations, np.tile(place, edges)])
@@ -113,7 +113,7 @@ def free_law(
     scale = np.concatenate([0.5 * durations, np.full(edges * points, 0.3)])
     cost = lambda x: x[:edges].sum()
     task = Task(robot, check_motors(motors, robot), net_rotation(robot, path), True, build, cost, lambda x: x[:0])
-    return least_duration(task, first[None], Box(low, high, scale), max_steps, progress)
+    return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
 
 def fastest_loop(
@@ -165,10 +165,10 @@ def fastest_loop(
     high = np.concatenate([np.full(knots, 3 * total / knots), np.tile(np.asarray(robot.upper, float), knots - 1)])
     scale = np.concatenate([np.full(knots, total / knots), np.tile(0.3 * reach, knots - 1)])
     task = Task(robot, motors, goal, False, build, lambda x: x[:knots].sum(), lambda x: x[:0])
-    return least_duration(task, np.clip(first, low, high), Box(low, high, scale), max_steps, progress)
+    return least_duration(task, np.clip(first, low, high), UnknownBox(low, high, scale), max_steps, progress)
 
 
-def joined(parts: Sequence[Trajectory]) -> Trajectory:
+def join(parts: Sequence[Trajectory]) -> Trajectory:
     """One trajectory after the other; each must begin where the one before it ends."""
     begin = jnp.cumsum(jnp.stack([jnp.zeros_like(parts[0].duration), *(part.duration for part in parts)]))
     breaks = [part.breaks[:-1] + start for part, start in zip(parts, begin[:-1], strict=True)]

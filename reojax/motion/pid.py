@@ -211,20 +211,20 @@ def _track(
     def step(carry: tuple[Array, ...], inputs: tuple[Array, ...]) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
         theta, theta_dot, rotation, integral, last = carry
         wanted, wanted_rate, given = inputs
-        seen = _counted(theta, size)
+        seen = _count(theta, size)
         error = wanted - seen
         rate = wanted_rate - (seen - last) / period
         summed = integral + period * error
         pid = gains.proportional * error + gains.integral * summed + gains.derivative * rate
         command = pid / ratio + given
-        torque = _saturated(motors, command, ratio * theta_dot)
+        torque = _saturate(motors, command, ratio * theta_dot)
         saturated = torque != command
         kept = jnp.where(saturated, integral, summed)  # no wind-up
 
-        def between(state: tuple[Array, ...], _: None) -> tuple[tuple[Array, ...], None]:
+        def clip_between(state: tuple[Array, ...], _: None) -> tuple[tuple[Array, ...], None]:
             return _runge_kutta(robot, motors, momentum, command, period / substeps, *state), None
 
-        state, _ = jax.lax.scan(between, (theta, theta_dot, rotation), length=substeps)
+        state, _ = jax.lax.scan(clip_between, (theta, theta_dot, rotation), length=substeps)
         return (*state, kept, seen), (theta, theta_dot, rotation, command, torque, saturated)
 
     start = plan.theta[0], plan.theta_dot[0], jnp.eye(3, dtype=dtype)
@@ -236,13 +236,13 @@ def _track(
     return Tracking(time, plan.theta, theta, theta_dot, rotation, command, torque, saturated)
 
 
-def _counted(theta: Array, size: Array) -> Array:
+def _count(theta: Array, size: Array) -> Array:
     """What encoders tell of joint angles, in counts of that `size`, all if 0; its derivative is that of the angles."""
     count = jnp.where(size > 0, size, 1)
     return theta + jax.lax.stop_gradient(jnp.where(size > 0, count * jnp.round(theta / count) - theta, 0))
 
 
-def _saturated(motors: Motor, command: Array, speed: Array) -> Array:
+def _saturate(motors: Motor, command: Array, speed: Array) -> Array:
     """Torque that the motors can give of what is asked for."""
     k = motors.torque_constant
     least, most = (jnp.asarray((sign * motors.supply - k * speed) * k / motors.resistance) for sign in (-1, 1))
@@ -289,7 +289,7 @@ def _acceleration(
     ratio = robot.gear_ratio
     speed = ratio * rate
     friction = motors.drag * speed + motors.friction * jnp.tanh(speed / _CREEP)
-    power = ratio * (_saturated(motors, command, speed) - friction)
+    power = ratio * (_saturate(motors, command, speed) - friction)
     still = joint_load(robot, theta, rate, jnp.zeros_like(theta), momentum=momentum)
     inertia = joint_inertia(robot, theta)
     rotor = robot.rotor_inertia * ratio**2

@@ -90,7 +90,7 @@ def released(
         ValueError: if anything does not fit the robot, or is not finite.
     """
     release = Release() if release is None else release
-    return _released(*_checked(robot, trajectory, release, steps), steps)
+    return _simulate_release(*_check_release(robot, trajectory, release, steps), steps)
 
 
 def release_spread(
@@ -121,14 +121,16 @@ def release_spread(
     """
     if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < 1:
         raise ValueError(f"`draws` is {draws!r}; it must be a positive integer.")
-    robot, trajectory, mean = _checked(robot, trajectory, Release() if expected is None else expected, steps)
-    *_, spread = _checked(robot, trajectory, deviation, steps)
+    robot, trajectory, mean = _check_release(robot, trajectory, Release() if expected is None else expected, steps)
+    *_, spread = _check_release(robot, trajectory, deviation, steps)
     if is_concrete(spread) and (np.asarray(spread) < 0).any():
         raise ValueError(f"`deviation` is {deviation}; standard deviations must not be negative.")
     return _spread(robot, trajectory, mean, spread, key, int(draws), int(steps))
 
 
-def _checked(robot: Robot, trajectory: Trajectory, release: Release, steps: int) -> tuple[Robot, Trajectory, Array]:
+def _check_release(
+    robot: Robot, trajectory: Trajectory, release: Release, steps: int
+) -> tuple[Robot, Trajectory, Array]:
     """Everything as arrays of one dtype, the release as one vector of ten."""
     if not isinstance(robot, Robot):
         raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
@@ -165,9 +167,9 @@ class _Node(NamedTuple):
 
 
 @partial(jax.jit, static_argnums=3)
-def _released(robot: Robot, trajectory: Trajectory, release: Array, steps: int) -> Released:
+def _simulate_release(robot: Robot, trajectory: Trajectory, release: Array, steps: int) -> Released:
     time, length, nodes = _nodes(robot, trajectory, steps)
-    return Released(time, *_integrated(length, nodes, release))
+    return Released(time, *_integrate(length, nodes, release))
 
 
 @partial(jax.jit, static_argnums=(5, 6))
@@ -177,7 +179,7 @@ def _spread(
     _, length, nodes = _nodes(robot, trajectory, steps)
 
     def end(release: Array) -> Array:
-        return _integrated(length, nodes, release)[0][-1]
+        return _integrate(length, nodes, release)[0][-1]
 
     # one program for everything: the expected release by each of its numbers, and the draws by none
     random = deviation[None] * jax.random.normal(key, (draws, mean.size), mean.dtype)
@@ -222,7 +224,7 @@ def _nodes(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Arr
     return time, length, jax.tree.map(lambda leaf: leaf.reshape(count, 3, *leaf.shape[1:]), nodes)
 
 
-def _integrated(length: Array, nodes: _Node, release: Array) -> tuple[Array, Array]:
+def _integrate(length: Array, nodes: _Node, release: Array) -> tuple[Array, Array]:
     """Rotations (m, 3, 3) and momenta (m, 3): Runge-Kutta of order four on the rotation vector of each step."""
     momentum, pull, tied, drag = release[:3], release[3:6], release[6:9], release[9]
     still = jnp.zeros_like(momentum)

@@ -122,7 +122,9 @@ def through(path: Path, durations: ArrayLike) -> Trajectory:
     return Trajectory(breaks, least_jerk(times, points))
 
 
-def overlapped(corners: Array, law: Law, start: Array, length: Array, moves: tuple[tuple[int, int], ...]) -> Trajectory:
+def overlap_pieces(
+    corners: Array, law: Law, start: Array, length: Array, moves: tuple[tuple[int, int], ...]
+) -> Trajectory:
     """Trajectory along a path whose joints move edge by edge, each joint in a time of its own.
 
     A move is one joint's part in one edge. Moves that overlap in time round the corners. Nothing is checked: moves of
@@ -148,7 +150,7 @@ def overlapped(corners: Array, law: Law, start: Array, length: Array, moves: tup
         """Coefficients of one move's law over one interval, by powers of the time since `begin`."""
         u = (middle - start) / length
         piece = jnp.clip((law.breaks <= u).sum() - 1, 0, law.coefficients.shape[0] - 1)
-        powers = shifted(law.coefficients[piece], (begin - start) / length - law.breaks[piece])
+        powers = shift(law.coefficients[piece], (begin - start) / length - law.breaks[piece])
         constant = jnp.zeros_like(powers).at[0].set(jnp.where(u < 0, 0, 1))
         return jnp.where((u < 0) | (u > 1), constant, powers) * (1 / length) ** jnp.arange(powers.shape[0])
 
@@ -159,7 +161,7 @@ def overlapped(corners: Array, law: Law, start: Array, length: Array, moves: tup
     return Trajectory(breaks, coefficients.at[:, 0].add(corners[:1]))
 
 
-def shifted(powers: Float[Array, " d+1"], by: Float[Array, ""]) -> Float[Array, " d+1"]:
+def shift(powers: Float[Array, " d+1"], by: Float[Array, ""]) -> Float[Array, " d+1"]:
     """Coefficients of `f(x + by)` from those of `f(x)`, lowest power first."""
     count = powers.shape[0]
     rows = []
@@ -169,7 +171,7 @@ def shifted(powers: Float[Array, " d+1"], by: Float[Array, ""]) -> Float[Array, 
     return jnp.stack(rows)
 
 
-def stretched(trajectory: Trajectory, factor: Float[Array, ""]) -> Trajectory:
+def stretch(trajectory: Trajectory, factor: Float[Array, ""]) -> Trajectory:
     """The same motion, `factor` times as long."""
     powers = trajectory.coefficients.shape[1]
     scale = (1 / jnp.asarray(factor)) ** jnp.arange(powers)

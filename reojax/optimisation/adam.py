@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array
-from reojax.optimisation.optimise import Solution, checked_starts
+from reojax.optimisation.optimise import Solution, check_starts
 
 
 def descend(
@@ -43,7 +43,7 @@ def descend(
     Raises:
         ValueError: as `optimise`.
     """
-    x, bounds = checked_starts(starts, lower, upper, None, data)
+    x, bounds = check_starts(starts, lower, upper, None, data)
     if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:
         raise ValueError(f"`steps` is {steps!r}; it must be a positive integer.")
     for entry, number in (("rate", rate), ("slope_tolerance", slope_tolerance)):

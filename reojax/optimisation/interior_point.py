@@ -22,7 +22,7 @@ import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
 from reojax._internal.arrays import Array
-from reojax._internal.linalg import factored, solve_factored
+from reojax._internal.linalg import factor, solve_factored
 
 ITERATIONS = 40
 """Most Newton steps; 10 to 20 is usual."""
@@ -121,7 +121,7 @@ def _newton(program: Quadratic, point: _Point) -> _Point:
     soft = jnp.asarray(_SOFT if left.dtype == jnp.float64 else 1e-4, left.dtype)
     give = over / above + under / below + soft
     matrix = program.curvature + jnp.diag(push / left + pull / right + soft)
-    upper = factored(matrix + (program.rows.T / give[None]) @ program.rows)
+    upper = factor(matrix + (program.rows.T / give[None]) @ program.rows)
     dual = program.slope + program.curvature @ point.d + program.rows.T @ point.y
     primal = program.rows @ point.d + program.offset
 

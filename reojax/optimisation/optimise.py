@@ -15,7 +15,17 @@ from numpy.typing import ArrayLike
 from tqdm import tqdm
 
 from reojax._internal.arrays import Array, as_numbers, common_float
-from reojax.optimisation.sqp import CONVERGED, NOT_FINITE, RUNNING, Problem, State, Values, advance, begin, residual
+from reojax.optimisation.sqp import (
+    CONVERGED,
+    NOT_FINITE,
+    RUNNING,
+    Iterate,
+    Subproblem,
+    Values,
+    advance,
+    begin,
+    residual,
+)
 
 Function = Callable[..., Any]
 _CHUNK = 10
@@ -83,7 +93,7 @@ def optimise(
         ValueError: naming the argument, its value and the rule, for bounds the wrong way round, a start outside,
             wrong shapes, a cost that is not a scalar or constraints that are not vectors.
     """
-    x, bounds = checked_starts(starts, lower, upper, scale, data)
+    x, bounds = check_starts(starts, lower, upper, scale, data)
     for entry, number in (("tolerance", tolerance), ("slope_tolerance", slope_tolerance)):
         if not np.isfinite(number) or number <= 0:
             raise ValueError(f"`{entry}` is {number!r}; it must be a positive number.")
@@ -134,14 +144,14 @@ def _with_gradient(function: Function, x: Array) -> tuple[Array, Array]:
     return value, gradient
 
 
-def _problem(functions: _Functions, data: Any, fixed: "_Fixed") -> Problem:
+def _problem(functions: _Functions, data: Any, fixed: "_Fixed") -> Subproblem:
     size = fixed.size
 
     def differentiate(x: Array) -> tuple[Values, Values]:
         values, slopes = functions.derivatives(x * size, data)
         return values, jax.tree.map(lambda slope: slope * jnp.broadcast_to(size, slope.shape), slopes)
 
-    return Problem(
+    return Subproblem(
         evaluate=lambda x: functions.values(x * size, data),
         differentiate=differentiate,
         lower=fixed.lower / size,
@@ -162,16 +172,16 @@ class _Fixed(NamedTuple):
 
 
 @partial(jax.jit, static_argnums=0)
-def _begin(functions: _Functions, x: Array, data: Any, fixed: _Fixed) -> State:
+def _begin(functions: _Functions, x: Array, data: Any, fixed: _Fixed) -> Iterate:
     return jax.vmap(lambda x, data: begin(_problem(functions, data, fixed), x / fixed.size))(x, data)
 
 
 @partial(jax.jit, static_argnums=0)
-def _advance(functions: _Functions, state: State, data: Any, fixed: _Fixed, steps: Array) -> State:
-    def step(state: State) -> State:
+def _advance(functions: _Functions, state: Iterate, data: Any, fixed: _Fixed, steps: Array) -> Iterate:
+    def step(state: Iterate) -> Iterate:
         return jax.vmap(lambda state, data: advance(_problem(functions, data, fixed), state))(state, data)
 
-    def going(carry: tuple[Array, State]) -> Array:
+    def going(carry: tuple[Array, Iterate]) -> Array:
         return (carry[0] < steps) & (carry[1].status == RUNNING).any()
 
     return jax.lax.while_loop(going, lambda carry: (carry[0] + 1, step(carry[1])), (jnp.zeros_like(steps), state))[1]
@@ -188,7 +198,7 @@ def _rounds(max_steps: int, progress: str | None) -> Iterator[np.int32]:
             bar.update(now)
 
 
-def _solution(state: State, fixed: _Fixed) -> Solution:
+def _solution(state: Iterate, fixed: _Fixed) -> Solution:
     x = np.clip(np.asarray(state.x * fixed.size[None]), fixed.lower[None], fixed.upper[None])
 
     begun = np.asarray(state.status) != NOT_FINITE
@@ -200,7 +210,7 @@ def _solution(state: State, fixed: _Fixed) -> Solution:
     return Solution(x, cost, miss, slope, np.asarray(state.steps), converged, int(best))
 
 
-def checked_starts(starts: Any, lower: Any, upper: Any, scale: Any, data: Any) -> tuple[Array, dict[str, np.ndarray]]:
+def check_starts(starts: Any, lower: Any, upper: Any, scale: Any, data: Any) -> tuple[Array, dict[str, np.ndarray]]:
     """Starts as (m, n), and bounds and sizes as (n,)."""
     x = np.asarray(as_numbers("starts", starts))
     x = x[None] if x.ndim == 1 else x

@@ -20,7 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from reojax._internal.arrays import Array
-from reojax._internal.linalg import factored, solve_factored
+from reojax._internal.linalg import factor, solve_factored
 from reojax.optimisation.interior_point import Quadratic, solve_quadratic
 
 LENGTHS = np.array([1.0, 0.5, 0.25, 0.1, 0.03, 0.004])
@@ -42,7 +42,7 @@ class Values(NamedTuple):
     """Must not be positive."""
 
 
-class Problem(NamedTuple):
+class Subproblem(NamedTuple):
     """The functions of a problem at its data, and its bounds, in the scaled variables."""
 
     evaluate: Callable[[Array], Values]
@@ -55,7 +55,7 @@ class Problem(NamedTuple):
     slope_tolerance: Array
 
 
-class State(NamedTuple):
+class Iterate(NamedTuple):
     """A start on its way: where it was last differentiated, and where it goes next."""
 
     x: Array
@@ -79,13 +79,13 @@ class State(NamedTuple):
     status: Array
 
 
-def begin(problem: Problem, x: Array) -> State:
+def begin(problem: Subproblem, x: Array) -> Iterate:
     """Return the state before the first step; nothing is evaluated yet."""
     n, dtype = x.shape[0], x.dtype
     shape = jax.eval_shape(problem.evaluate, x)
     now = jax.tree.map(lambda value: jnp.zeros(value.shape, dtype), shape)
     slopes = jax.tree.map(lambda value: jnp.zeros((*value.shape, n), dtype), shape)
-    return State(
+    return Iterate(
         x=x,
         now=now,
         slopes=slopes,
@@ -103,7 +103,7 @@ def begin(problem: Problem, x: Array) -> State:
     )
 
 
-def advance(problem: Problem, state: State) -> State:
+def advance(problem: Subproblem, state: Iterate) -> Iterate:
     """Differentiate at the point ahead, and choose the next one; unless the start has ended."""
     now, slopes = problem.differentiate(state.ahead)
     first, finite = state.steps == 0, _finite(now, slopes)
@@ -116,7 +116,7 @@ def advance(problem: Problem, state: State) -> State:
     here = jax.tree.map(lambda a, b: jnp.where(finite, a, b), here, state)  # not finite: stay where it was
     before, after = (_lagrangian_slope(s) for s in (state._replace(scale=here.scale), here))
     change = jnp.where(problem.upper > problem.lower, after - before, 0.0)  # held variables stay out of the curvature
-    curvature, fresh = _measured(state, here.x - state.x, change, ~first)
+    curvature, fresh = _measure(state, here.x - state.x, change, ~first)
     radius = jnp.where(finite, here.radius, 0.2 * here.radius)
     here = here._replace(curvature=curvature, fresh=fresh, slope=_slope(problem, here, after), radius=radius)
     met = finite & (residual(here.now) <= problem.tolerance) & (here.slope <= problem.slope_tolerance)
@@ -164,7 +164,7 @@ def _finite(*values: Values) -> Array:
     return jnp.stack([jnp.isfinite(leaf).all() for leaf in jax.tree.leaves(values)]).all()
 
 
-def _program(problem: Problem, state: State) -> Quadratic:
+def _program(problem: Subproblem, state: Iterate) -> Quadratic:
     now, slopes, scale = state.now, state.slopes, state.scale
     free = problem.upper > problem.lower
     rows = jnp.concatenate([slopes.vanish / scale.vanish[:, None], slopes.below / scale.below[:, None]])
@@ -186,7 +186,7 @@ def _violations(offset: Array, vanish: Array) -> Array:
     return jnp.where(vanish, jnp.abs(offset), jnp.maximum(offset, 0.0))
 
 
-def _search(problem: Problem, state: State, program: Quadratic, d: Array) -> tuple[Array, Array]:
+def _search(problem: Subproblem, state: Iterate, program: Quadratic, d: Array) -> tuple[Array, Array]:
     """Point of least merit on line and arc, and whether it is good enough to go there.
 
     Once less is promised than the rounding of the merit, the whole arc is taken as long as the constraints hold.
@@ -226,7 +226,7 @@ def _model_change(program: Quadratic, d: Array) -> Array:
     return program.slope @ d + program.price * (after - before)
 
 
-def _bend(state: State, program: Quadratic, d: Array, offset: Array) -> Array:
+def _bend(state: Iterate, program: Quadratic, d: Array, offset: Array) -> Array:
     """Shortest change that takes back, to first order, what the active constraints gained beyond their linear model.
 
     Variables that the step has put onto a bound stay there.
@@ -242,16 +242,16 @@ def _bend(state: State, program: Quadratic, d: Array, offset: Array) -> Array:
     gram = rows.T @ rows
     small = 1e-9 if d.dtype == jnp.float64 else 1e-4
     gram = gram + small * (jnp.trace(gram) + small) * jnp.eye(d.shape[0], dtype=d.dtype)
-    return -solve_factored(factored(gram), rows.T @ jnp.where(active, excess, 0.0))
+    return -solve_factored(factor(gram), rows.T @ jnp.where(active, excess, 0.0))
 
 
-def _lagrangian_slope(state: State) -> Array:
+def _lagrangian_slope(state: Iterate) -> Array:
     vanish, below = state.scale.vanish, state.scale.below
     rows = jnp.concatenate([state.slopes.vanish / vanish[:, None], state.slopes.below / below[:, None]])
     return state.slopes.cost / state.scale.cost + state.multipliers @ rows
 
 
-def _slope(problem: Problem, state: State, gradient: Array) -> Array:
+def _slope(problem: Subproblem, state: Iterate, gradient: Array) -> Array:
     """Largest component of the Lagrangian's gradient that does not press against a bound, and of complementarity."""
     pressed = state.x - jnp.clip(state.x - gradient, problem.lower, problem.upper)
     count = state.now.vanish.shape[0]
@@ -259,7 +259,7 @@ def _slope(problem: Problem, state: State, gradient: Array) -> Array:
     return jnp.maximum(jnp.abs(pressed).max(), jnp.maximum(loose, 0.0).max(initial=0.0))
 
 
-def _measured(state: State, s: Array, y: Array, useful: Array) -> tuple[Array, Array]:
+def _measure(state: Iterate, s: Array, y: Array, useful: Array) -> tuple[Array, Array]:
     """Damped BFGS update, if `useful`; the first one also sets the size."""
     square = s @ s
     eps = jnp.finfo(s.dtype).eps

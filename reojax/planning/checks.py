@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import as_numbers, is_concrete
-from reojax.manoeuvres import Layout, _check_layout, layout_for
-from reojax.robot import Robot
+from reojax.manoeuvres import Layout, check_layout
+from reojax.robot import Robot, layout_of
 
 OBJECTIVES = ("count", "travel")
 _ORTHOGONAL = 1e-6
@@ -74,14 +74,14 @@ def key_of(robot: Robot) -> Hashable:
 
 
 def robot_and_layout(robot: Any, layout: Layout | None) -> Layout:
-    """Return the layout, by default that for the robot's number of joints."""
+    """Return the layout, by default the robot's own."""
     if not isinstance(robot, Robot):
         raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
     if not is_concrete(robot):
         raise ValueError("`robot` is traced; planning runs on the host, outside of jit, vmap and grad.")
     if layout is None:
-        return layout_for(robot)
-    _check_layout(layout)
+        layout = layout_of(robot)
+    check_layout(layout)
     if layout.joints != robot.joints:
         raise ValueError(f"`layout` is for {layout.joints} joints; {robot.name!r} has {robot.joints}.")
     return layout

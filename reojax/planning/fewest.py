@@ -10,9 +10,19 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from reojax.planning import quaternions
-from reojax.planning.candidates import SIZES, Rows, Scene, attempt, least, settle, shortened, starting_rows, travel
+from reojax.planning.candidates import (
+    SIZES,
+    Candidates,
+    Context,
+    attempt,
+    least,
+    settle,
+    shorten_candidates,
+    starting_rows,
+    travel,
+)
 from reojax.planning.initial_guesses import FIRST, Starts
-from reojax.planning.repeated_loops import grouped_rows, loops
+from reojax.planning.repeated_loops import group_rows, loops
 
 LONGEST = 5
 """Longest word whose loops each have amplitudes of their own; longer words repeat loops."""
@@ -42,12 +52,12 @@ _LEAST_TRAVEL = 10
 class Answer:
     """The best word so far for each of m targets: solved before not, then by what counts."""
 
-    def __init__(self, scene: Scene, targets: np.ndarray, tolerance: float):
+    def __init__(self, scene: Context, targets: np.ndarray, tolerance: float):
         m, d = targets.shape[1], scene.box.low.shape[1]
         slots = SIZES[-1]
         square = 4 * (targets[1:] ** 2).sum(0)
         empty = np.full((slots, m), -1), np.ones((slots, m)), np.zeros((d, slots, m)), square
-        self.rows = Rows(np.arange(m), *empty)
+        self.rows = Candidates(np.arange(m), *empty)
         self.travel = np.zeros(m)
         self.tolerance = tolerance
         self._box = scene.box
@@ -57,7 +67,7 @@ class Answer:
         """(m,) whether the word reaches the target, on the true rotations."""
         return self.rows.square <= self.tolerance**2
 
-    def offer(self, rows: Rows) -> None:
+    def offer(self, rows: Candidates) -> None:
         """Take rows, one for each of some targets, that are better than what is there."""
         cost = travel(self._box, rows)
         now = self.rows.square[rows.owner]
@@ -74,7 +84,7 @@ class Answer:
         self.travel[owner] = cost
 
 
-def fewest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> Answer:
+def fewest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -> Answer:
     """Words of the fewest loops, up to `most`, and of these of least travel, for targets (4, m)."""
     answer = Answer(scene, targets, tolerance)
     longest = min(most, LONGEST)
@@ -89,7 +99,7 @@ def fewest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> An
 
 
 def _with_loops(
-    scene: Scene, targets: np.ndarray, answer: Answer, slots: int, rounds: Sequence[tuple[int, int]]
+    scene: Context, targets: np.ndarray, answer: Answer, slots: int, rounds: Sequence[tuple[int, int]]
 ) -> None:
     """Try words of `slots` loops for what is not reached yet."""
     waiting = np.flatnonzero(~answer.solved)
@@ -102,14 +112,14 @@ def _with_loops(
         some = Starts(*(field[..., first:last] for field in starts))
         found = attempt(scene, targets, starting_rows(waiting[trying], some))
         if slots in _CLOSE_FEW:
-            found = _continued(scene, targets, found)
+            found = _continue_search(scene, targets, found)
         closest[trying] = found.square.reshape(-1, last - first).min(1)
         missed = found.take(found.square >= close)
         answer.offer(least(missed, missed.square))
-        _offer_solved(scene, targets, answer, found.take(found.square < close), keep=1)
+        _update_from_solutions(scene, targets, answer, found.take(found.square < close), keep=1)
 
 
-def _as_near_as_possible(scene: Scene, targets: np.ndarray, answer: Answer, slots: int) -> None:
+def _as_near_as_possible(scene: Context, targets: np.ndarray, answer: Answer, slots: int) -> None:
     """Bring words of `slots` loops near the targets that are not reached, however far away they are."""
     waiting = np.flatnonzero(~answer.solved)
     starts = scene.pool.near(targets[:, waiting], slots, FIRST)
@@ -117,7 +127,7 @@ def _as_near_as_possible(scene: Scene, targets: np.ndarray, answer: Answer, slot
     answer.offer(least(found, found.square))
 
 
-def _continued(scene: Scene, targets: np.ndarray, found: Rows) -> Rows:
+def _continue_search(scene: Context, targets: np.ndarray, found: Candidates) -> Candidates:
     """Go on with what comes near a target slowly, as words do that barely reach it."""
     found = found._replace(x=found.x.copy(), square=found.square.copy())
     for _ in range(_PATIENCE):
@@ -127,7 +137,7 @@ def _continued(scene: Scene, targets: np.ndarray, found: Rows) -> Rows:
     return found
 
 
-def cheapest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> Answer:
+def cheapest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -> Answer:
     """Words of least travel, of up to `most` loops; never more than those of the fewest loops."""
     answer = fewest(scene, targets, min(most, LONGEST), tolerance)
     waiting = np.flatnonzero((answer.travel > 0) | ~answer.solved)
@@ -138,39 +148,39 @@ def cheapest(scene: Scene, targets: np.ndarray, most: int, tolerance: float) -> 
         found = attempt(scene, targets, least(rows, value, _LEAST_TRAVEL))
         missed = found.take(found.square >= _CLOSE)
         answer.offer(least(missed, missed.square))
-        _offer_solved(scene, targets, answer, found.take(found.square < _CLOSE), keep=4)
+        _update_from_solutions(scene, targets, answer, found.take(found.square < _CLOSE), keep=4)
     if most > LONGEST:
         _with_small_loops(scene, targets, most, answer, lambda rows: travel(scene.box, rows))
     return answer
 
 
 def _with_small_loops(
-    scene: Scene, targets: np.ndarray, most: int, answer: Answer, value: Callable[[Rows], np.ndarray]
+    scene: Context, targets: np.ndarray, most: int, answer: Answer, value: Callable[[Candidates], np.ndarray]
 ) -> None:
     """Try words of many equal loops where nothing else reached the target; of the solved ones the least `value`."""
-    found = attempt(scene, targets, grouped_rows(scene, targets, np.flatnonzero(~answer.solved), most))
+    found = attempt(scene, targets, group_rows(scene, targets, np.flatnonzero(~answer.solved), most))
     missed = found.take(found.square >= _CLOSE)
     answer.offer(least(missed, missed.square))
     found = found.take(found.square < _CLOSE)
     best = least(found, value(found) + np.where(found.square > _EXACT, 1e6, 0.0), _AGAIN)
-    short = settle(scene, targets, shortened(scene, targets, best), answer.tolerance)
+    short = settle(scene, targets, shorten_candidates(scene, targets, best), answer.tolerance)
     plain = settle(scene, targets, best, answer.tolerance)
     for rows in (short, plain):
         off = np.where(rows.square <= answer.tolerance**2, 0.0, 1e9)
         answer.offer(least(rows, off + 1e3 * value(rows) + travel(scene.box, rows)))
 
 
-def _offer_solved(scene: Scene, targets: np.ndarray, answer: Answer, found: Rows, keep: int) -> None:
+def _update_from_solutions(scene: Context, targets: np.ndarray, answer: Answer, found: Candidates, keep: int) -> None:
     """Shorten what reaches the target on the table, and solve it on the true rotations."""
     value = travel(scene.box, found) + np.where(found.square > _EXACT, 1e3, 0.0)
-    short = shortened(scene, targets, least(found, value, keep))
+    short = shorten_candidates(scene, targets, least(found, value, keep))
     answer.offer(settle(scene, targets, least(short, travel(scene.box, short)), answer.tolerance))
     lost = ~answer.solved[found.owner]  # at the edge of what can be reached, where the table is not enough
     again = settle(scene, targets, least(found.take(lost), found.square[lost], _AGAIN), answer.tolerance)
     answer.offer(least(again, again.square))
 
 
-def from_folded(scene: Scene, targets: np.ndarray) -> np.ndarray:
+def rotation_from_folded(scene: Context, targets: np.ndarray) -> np.ndarray:
     """Targets (4, m) as seen between the folded ends of a word: `F^-1 R F`."""
     fold = scene.fold[:, None]
     return np.stack(quaternions.product(quaternions.product(quaternions.inverse(fold), targets), fold))

@@ -19,7 +19,7 @@ from reojax._internal.arrays import Array
 from reojax.manoeuvres import Layout
 from reojax.optimisation.optimise import optimise
 from reojax.planning import checks, quaternions
-from reojax.planning.free_polygons import Polygons, Pool, family_of
+from reojax.planning.free_polygons import Polygons, PolygonTable, family_of
 from reojax.planning.words import box_of
 from reojax.robot import Robot
 
@@ -130,7 +130,7 @@ class _Solver(NamedTuple):
     """What all solutions of one call share."""
 
     polygons: Polygons
-    pool: Pool
+    pool: PolygonTable
     rows: int
     exact: float
     bar: Any

@@ -23,7 +23,7 @@ from reojax.mechanics.holonomy import net_rotation
 from reojax.path import Path
 from reojax.planning import quaternions
 from reojax.planning.checks import key_of
-from reojax.planning.words import Box, folded
+from reojax.planning.words import AmplitudeBox, fold_angles
 from reojax.robot import Robot
 
 COARSE, FINE = 2, 8
@@ -52,7 +52,7 @@ class Polygons(NamedTuple):
     """Rotation vector (3,) from the target, by `COARSE` steps."""
 
 
-class Pool(NamedTuple):
+class PolygonTable(NamedTuple):
     """Random polygons within one box: the first half of any kind, the others words of rectangles."""
 
     low: Float[np.ndarray, " n"]
@@ -71,10 +71,12 @@ class Pool(NamedTuple):
 
 
 _polygons: OrderedDict[Hashable, Polygons] = OrderedDict()
-_pools: OrderedDict[Hashable, Pool] = OrderedDict()
+_pools: OrderedDict[Hashable, PolygonTable] = OrderedDict()
 
 
-def family_of(robot: Robot, layout: Layout, box: Box, corners: int, seed: int) -> tuple[Polygons, Pool]:
+def family_of(
+    robot: Robot, layout: Layout, box: AmplitudeBox, corners: int, seed: int
+) -> tuple[Polygons, PolygonTable]:
     """Polygons with `corners` free corners and random ones within the box; the last few are kept, with programs."""
     low, high = box.low[0], box.high[0]
     key = key_of(robot), jax.dtypes.canonicalize_dtype(float), layout, corners
@@ -94,7 +96,7 @@ def _kept(store: OrderedDict[Hashable, _Kept], key: Hashable, make: Callable[[],
 
 
 def _polygons_of(robot: Robot, layout: Layout, corners: int) -> Polygons:
-    rest = folded(layout)[None]
+    rest = fold_angles(layout)[None]
     before = np.concatenate([0 * rest, rest]) if layout.fold else rest
     after = before[::-1]
     place = np.zeros((3, layout.joints))
@@ -126,14 +128,14 @@ def _polygons_of(robot: Robot, layout: Layout, corners: int) -> Polygons:
     return Polygons(paths, rotations, travel, miss)
 
 
-def _pool(polygons: Polygons, low: np.ndarray, high: np.ndarray, corners: int, seed: int) -> Pool:
+def _pool(polygons: Polygons, low: np.ndarray, high: np.ndarray, corners: int, seed: int) -> PolygonTable:
     rng = np.random.default_rng(seed)
     kinds = np.concatenate([_anyhow(rng, low, high, corners), _words(rng, low, high, corners)])
     size = np.where(rng.random(len(kinds)) < 0.5, 1.0, 10.0 ** rng.uniform(-3, 0, len(kinds)))
     x = (kinds * size[:, None, None]).reshape(len(kinds), -1)
     lengths = np.abs(np.diff(polygons.paths(x), axis=1)).sum((1, 2))
     turns = quaternions.from_matrices(polygons.rotations(x))
-    return Pool(np.tile(low, corners), np.tile(high, corners), x, turns, lengths)
+    return PolygonTable(np.tile(low, corners), np.tile(high, corners), x, turns, lengths)
 
 
 def _anyhow(rng: np.random.Generator, low: np.ndarray, high: np.ndarray, corners: int) -> np.ndarray:

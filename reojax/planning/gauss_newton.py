@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
 from reojax._internal.arrays import Array
-from reojax.planning.residual import Miss, Word, chained, dual, miss, pull, step
+from reojax.planning.residual import Miss, Word, chain, dual, miss, pull, step
 from reojax.planning.table import Table, read
 
 _SOLVED = 1e-14
@@ -27,7 +27,7 @@ _FEASIBLE = 1e-10
 """Squared residual up to which a shortened word still counts as on the target."""
 
 
-class Found(NamedTuple):
+class Iterate(NamedTuple):
     """Amplitudes found."""
 
     x: Float[Array, "d k m"]
@@ -39,7 +39,7 @@ class Found(NamedTuple):
 
 
 @jax.jit
-def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Found:
+def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Iterate:
     """Bring words to their targets by Levenberg-Marquardt steps, clipped to the box."""
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
 
@@ -62,11 +62,11 @@ def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Found:
     start = (0, x, x, nothing, jnp.full_like(nothing.square, 1.5), jnp.stack([nothing.square] * 2))
     _, x, _, at, _, before = jax.lax.while_loop(going, body, start)
     alone = (word.letter >= 0).sum(0) == 1
-    return Found(x, at.square, (at.square > _SOLVED) & (alone | (at.square < _STALLED * before[1])))
+    return Iterate(x, at.square, (at.square > _SOLVED) & (alone | (at.square < _STALLED * before[1])))
 
 
 @partial(jax.jit, static_argnums=4)
-def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], steps: int = 20) -> Found:
+def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], steps: int = 20) -> Iterate:
     """Move solved words along their solutions to less travel, `sum(price |x|)`, each amplitude keeping its sign."""
     sign = jnp.where(x < 0, -1.0, 1.0).astype(x.dtype)
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
@@ -97,7 +97,7 @@ def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], st
         return x, jnp.clip(here + dx, word.low, word.high), at, reach
 
     x, _, at, _ = jax.lax.fori_loop(0, 3 * steps + 1, body, (x, x, _nothing(x), jnp.full_like(zero, 0.2)))
-    return Found(x, at.square, at.square < 0)
+    return Iterate(x, at.square, at.square < 0)
 
 
 @jax.jit
@@ -110,7 +110,7 @@ def refine(
     """
     near, slopes = read(table, word.letter, x)
     same_sign = jnp.where(((true * near).sum(0) < 0)[None], -true, true)
-    at = chained(word, same_sign, slopes)
+    at = chain(word, same_sign, slopes)
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
     damping = strength * (at.jacobian**2).sum((0, 1, 2))
     dx = _up_to_the_edge(x, word, used, lambda free, held: step(at, free, held, damping))

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 
 from reojax.planning import quaternions
 from reojax.planning.table import Table, read
-from reojax.planning.words import Box
+from reojax.planning.words import AmplitudeBox
 
 _POOL = 4096
 """Loops drawn for each letter."""
@@ -36,10 +36,10 @@ class Starts(NamedTuple):
     """Chord between the quaternions of start and target: half the angle between them, if small."""
 
 
-class Pool:
+class GuessTable:
     """Random words of a table's loops by length, made when first asked for; seeded, so always the same."""
 
-    def __init__(self, table: Table, box: Box):
+    def __init__(self, table: Table, box: AmplitudeBox):
         rng = np.random.default_rng(0)
         letter = np.repeat(np.arange(len(box.letters)), _POOL)
         low, high = box.low[letter].T, box.high[letter].T

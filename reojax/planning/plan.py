@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from reojax._internal.arrays import Array
 from reojax.manoeuvres import Layout
 from reojax.planning import checks, quaternions
-from reojax.planning.candidates import Scene, joined, scene
-from reojax.planning.fewest import cheapest, fewest, from_folded
+from reojax.planning.candidates import Context, context, join
+from reojax.planning.fewest import cheapest, fewest, rotation_from_folded
 from reojax.planning.result import Plan, first_of, plans
 from reojax.planning.words import VOCABULARIES, box_of
 from reojax.robot import Robot
@@ -22,7 +22,7 @@ _BATCH = 4096
 """Targets solved together, between two reports of progress."""
 _KEPT = 8
 """Robots and limits whose tables are kept."""
-_scenes: OrderedDict[Any, Scene] = OrderedDict()
+_scenes: OrderedDict[Any, Context] = OrderedDict()
 
 
 def plan(
@@ -90,14 +90,14 @@ def plan_many(
     letters = VOCABULARIES[checks.one_of("vocabulary", vocabulary, tuple(VOCABULARIES))]
     here = _scene(robot, layout, letters, twist_limit, bend_limit)
     wanted = quaternions.from_matrices(targets)
-    seen = from_folded(here, wanted)
+    seen = rotation_from_folded(here, wanted)
     parts = []
     with _bar(wanted.shape[1], progress) as bar:
         for first in range(0, wanted.shape[1], _BATCH):
             batch = seen[:, first : first + _BATCH]
             parts.append(search(here, batch, most, tolerance).rows)
             bar.update(batch.shape[1])
-    return plans(here, joined(parts), wanted, tolerance)
+    return plans(here, join(parts), wanted, tolerance)
 
 
 def replan(robot: Robot, target: ArrayLike, measured: ArrayLike, **options: Any) -> Plan:
@@ -117,11 +117,11 @@ def replan(robot: Robot, target: ArrayLike, measured: ArrayLike, **options: Any)
     return plan(robot, now.T @ wanted, **options)
 
 
-def _scene(robot: Robot, layout: Layout, letters: str, twist_limit: float, bend_limit: float) -> Scene:
+def _scene(robot: Robot, layout: Layout, letters: str, twist_limit: float, bend_limit: float) -> Context:
     """Compute what plans of one robot within one box share, or find it among the last few."""
     key = (checks.key_of(robot), layout, letters, twist_limit, bend_limit, jax.dtypes.canonicalize_dtype(float))
     if key not in _scenes:
-        _scenes[key] = scene(robot, layout, box_of(robot, layout, letters, twist_limit, bend_limit))
+        _scenes[key] = context(robot, layout, box_of(robot, layout, letters, twist_limit, bend_limit))
         if len(_scenes) > _KEPT:
             _scenes.popitem(last=False)
     _scenes.move_to_end(key)

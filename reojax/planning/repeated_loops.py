@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from reojax.planning import quaternions
-from reojax.planning.candidates import Rows, Scene
+from reojax.planning.candidates import Candidates, Context
 from reojax.planning.table import true_rotations
 from reojax.planning.words import last_twist
 
@@ -39,7 +39,7 @@ class Units(NamedTuple):
     """Half the rotation vector [rad]."""
 
 
-def units(scene: Scene) -> Units:
+def units(scene: Context) -> Units:
     """Loops at the limits."""
     box = scene.box
     free = box.low.shape[1] == 3
@@ -58,7 +58,7 @@ def units(scene: Scene) -> Units:
     return Units(letter, x, turn.reshape(3, 2, 2))
 
 
-def grouped_rows(scene: Scene, targets: np.ndarray, owner: np.ndarray, most: int) -> Rows:
+def group_rows(scene: Context, targets: np.ndarray, owner: np.ndarray, most: int) -> Candidates:
     """Rows to start from, for the targets `owner`: all ways to make the best splits whole with up to `most` loops."""
     one = units(scene)
     kind, numbers, who = _splits(one, targets[:, owner])
@@ -71,10 +71,10 @@ def grouped_rows(scene: Scene, targets: np.ndarray, owner: np.ndarray, most: int
                 rows.extend(_whole(one, kind[:, split], numbers[:, split], most, owner[i]))
     fields = [np.stack(field, axis=-1) for field in zip(*rows, strict=True)] if rows else _nothing(one)
     owners, letter, runs, x = fields
-    return Rows(owners, letter, runs, x, np.full(len(rows), np.inf))
+    return Candidates(owners, letter, runs, x, np.full(len(rows), np.inf))
 
 
-def loops(rows: Rows) -> np.ndarray:
+def loops(rows: Candidates) -> np.ndarray:
     """Number of loops (m,) of each row."""
     return np.where(rows.letter >= 0, rows.runs, 0).sum(0)
 

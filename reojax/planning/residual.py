@@ -48,10 +48,10 @@ class Miss(NamedTuple):
 def miss(table: Table, word: Word, x: Float[Array, "d k m"]) -> Miss:
     """Evaluate words with amplitudes `x` on the table."""
     q, dq = read(table, word.letter, x)
-    return chained(word, q, dq)
+    return chain(word, q, dq)
 
 
-def chained(word: Word, q: Float[Array, "4 k m"], dq: Float[Array, "d 4 k m"]) -> Miss:
+def chain(word: Word, q: Float[Array, "4 k m"], dq: Float[Array, "d 4 k m"]) -> Miss:
     """Put the loops' quaternions and their derivatives together."""
     q, dq = jax.lax.optimization_barrier(_powers(word.runs, q, dq))  # once, not again for every product
     rest = jnp.ones_like(word.target[0]), *jnp.zeros_like(word.target[1:])

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from reojax.planning import quaternions
-from reojax.planning.candidates import Rows, Scene
+from reojax.planning.candidates import Candidates, Context
 from reojax.planning.table import true_rotations
 from reojax.planning.words import last_twist, word_corners
 
@@ -39,7 +39,7 @@ class Plan(NamedTuple):
     """Whether `error` is within the tolerance."""
 
 
-def plans(scene: Scene, rows: Rows, targets: np.ndarray, tolerance: float) -> Plan:
+def plans(scene: Context, rows: Candidates, targets: np.ndarray, tolerance: float) -> Plan:
     """Write out words for targets (4, m) as a plan for many, with true rotations by twice the default steps."""
     box, layout = scene.box, scene.layout
     m = len(rows.owner)
@@ -87,11 +87,11 @@ def _stack(rows: Sequence[np.ndarray], fill: str | float | None) -> np.ndarray:
     """Stack rows of different lengths, filled up at the end; with None by the row's last entry."""
     longest = max((len(row) for row in rows), default=0)
 
-    def filled(row: np.ndarray) -> np.ndarray:
+    def fill_row(row: np.ndarray) -> np.ndarray:
         if len(row) == longest:
             return row
         missing = longest - len(row)
         rest = row[-1:].repeat(missing, 0) if fill is None else np.full(missing, fill, row.dtype)
         return np.concatenate([row, rest])
 
-    return np.array([filled(row) for row in rows])
+    return np.array([fill_row(row) for row in rows])

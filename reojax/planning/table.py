@@ -23,7 +23,7 @@ from reojax.mechanics._fast.parameters import Pattern, pattern_of
 from reojax.mechanics.holonomy import DEFAULT_STEPS, _net_rotation, net_rotation
 from reojax.path import polygon
 from reojax.planning import quaternions
-from reojax.planning.words import Box, folded, last_twist, loop_corners
+from reojax.planning.words import AmplitudeBox, fold_angles, last_twist, loop_corners
 from reojax.robot import Robot
 
 _CHUNK = 128
@@ -63,7 +63,7 @@ def fold_rotation(robot: Robot, layout: Layout) -> Float[np.ndarray, "4"]:
     """Quaternion of the rotation while the feet fold; that of the identity if there are none."""
     if layout.fold is None:
         return np.array([1.0, 0, 0, 0])
-    path = polygon(np.stack([np.zeros(layout.joints), folded(layout)]))
+    path = polygon(np.stack([np.zeros(layout.joints), fold_angles(layout)]))
     return quaternions.from_matrices(np.asarray(net_rotation(robot, path, steps=2 * DEFAULT_STEPS))[None])[:, 0]
 
 
@@ -78,7 +78,7 @@ class Table(NamedTuple):
     """Distance of nodes [rad]."""
 
 
-def tabulate(robot: Robot, layout: Layout, box: Box) -> Table:
+def tabulate(robot: Robot, layout: Layout, box: AmplitudeBox) -> Table:
     """Compute the table of a robot's loops over a box."""
     kinds, d = box.low.shape
     widest = (box.high - box.low).max(0)

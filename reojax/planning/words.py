@@ -23,7 +23,7 @@ _LAST = {"A": -1.0, "B": 1.0}
 """How far the last distal joint turns per turn of the first one; R leaves it free."""
 
 
-class Box(NamedTuple):
+class AmplitudeBox(NamedTuple):
     """Amplitudes allowed for each letter, letters on the first axis: twist, bend and, if free, last twist [rad]."""
 
     letters: str
@@ -34,7 +34,7 @@ class Box(NamedTuple):
     """Largest amplitudes."""
 
 
-def box_of(robot: Robot, layout: Layout, letters: str, twist_limit: float, bend_limit: float) -> Box:
+def box_of(robot: Robot, layout: Layout, letters: str, twist_limit: float, bend_limit: float) -> AmplitudeBox:
     """Amplitudes within both the limits asked for and the robot's own joint limits.
 
     Raises:
@@ -63,7 +63,7 @@ def box_of(robot: Robot, layout: Layout, letters: str, twist_limit: float, bend_
             rows = [(max(twist[0], ends[0]), min(twist[1], ends[1])), bend]
         low.append([row[0] for row in rows])
         high.append([row[1] for row in rows])
-    return Box(letters, np.array(low), np.array(high))
+    return AmplitudeBox(letters, np.array(low), np.array(high))
 
 
 def last_twist(letters: str, word: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -76,14 +76,14 @@ def last_twist(letters: str, word: np.ndarray, x: np.ndarray) -> np.ndarray:
 def loop_corners(layout: Layout, twist: np.ndarray, bend: np.ndarray, last: np.ndarray) -> np.ndarray:
     """Corners (m, 5, j) of rectangles with amplitudes (m,), feet folded."""
     corners = np.zeros((len(twist), 5, layout.joints))
-    corners[:] = folded(layout)
+    corners[:] = fold_angles(layout)
     corners[:, 2:4, layout.twist[0]] = twist[:, None]
     corners[:, 2:4, layout.twist[1]] = last[:, None]
     corners[:, 1:3, layout.bend] = bend[:, None]
     return corners
 
 
-def folded(layout: Layout) -> np.ndarray:
+def fold_angles(layout: Layout) -> np.ndarray:
     """Joint angles (j,) between loops: zero, but for folded feet."""
     angles = np.zeros(layout.joints)
     if layout.fold is not None:
@@ -96,6 +96,6 @@ def word_corners(layout: Layout, twist: np.ndarray, bend: np.ndarray, last: np.n
     if not len(twist):
         return np.zeros((1, layout.joints))
     loops = loop_corners(layout, twist, bend, last)[:, 1:].reshape(-1, layout.joints)
-    rest = folded(layout)[None]
+    rest = fold_angles(layout)[None]
     ends = [rest * 0] if layout.fold is not None else []
     return np.concatenate([*ends, rest, loops, *ends])

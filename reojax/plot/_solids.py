@@ -100,7 +100,7 @@ def _link(robot: Robot, link: int, thin: float) -> Faces:
     frame, half, sides = _solid(robot, link, thin)
     radius = max(min(0.3 * half.min(), thin), thin / 2)
     outside = [p for p in joints if (np.abs(frame.T @ (p - com)) > 1.05 * half + radius).any()]
-    body = _prism(com, frame, half * (_INNER if _hidden(robot, link) else 1), sides)
+    body = _prism(com, frame, half * (_INNER if _hide_inner_faces(robot, link) else 1), sides)
     return np.concatenate([body, *(beam(com, p, radius) for p in outside)])
 
 
@@ -126,7 +126,7 @@ def _solid(robot: Robot, link: int, thin: float) -> tuple[np.ndarray, np.ndarray
     return frame * np.array([1, 1, np.sign(np.linalg.det(frame))]), np.maximum(half, thin / 2), sides
 
 
-def _hidden(robot: Robot, link: int) -> bool:
+def _hide_inner_faces(robot: Robot, link: int) -> bool:
     """Tell whether a neighbour with more mass fills the same space, in the straight pose."""
     neighbours = [(p, k + 1, np.asarray(robot.anchor[k], float)) for k, p in enumerate(robot.parent)]
     shifts = [(child, shift) for p, child, shift in neighbours if p == link]

@@ -37,7 +37,7 @@ def check_view(view: View) -> None:
         raise ValueError(f"`view` is {view}; angles must be finite, and the elevation between -90 and 90 degrees.")
 
 
-def shaded(faces: Float[np.ndarray, "f 4 3"], colours: list[str], view: View) -> Float[np.ndarray, "f 3"]:
+def shade(faces: Float[np.ndarray, "f 4 3"], colours: list[str], view: View) -> Float[np.ndarray, "f 3"]:
     """Colours (r, g, b) of faces in a light from above the viewer's left shoulder."""
     normal = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)

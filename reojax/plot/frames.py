@@ -22,7 +22,7 @@ from reojax.mechanics.holonomy import rotation_history
 from reojax.path import Path
 from reojax.plot._style import INK
 from reojax.plot._view import View
-from reojax.plot.robots import draw_axes, draw_robot, posed_faces
+from reojax.plot.robots import draw_axes, draw_robot, faces_at_pose
 from reojax.robot import Robot
 
 
@@ -69,7 +69,7 @@ def draw_frames(
     Raises:
         ValueError: if numbers of axes, frames and titles differ, or a pose does not fit the robot.
     """
-    frames = _checked(robot, frames)
+    frames = _check_frames(robot, frames)
     count = len(frames.theta)
     if len(axes) != count or (titles is not None and len(titles) != count):
         named = "" if titles is None else f" and {len(titles)} titles"
@@ -194,7 +194,7 @@ def animate(
         ValueError: if the file cannot be written, a pose does not fit the robot, or a number is not positive.
     """
     target = check_animation(file)
-    frames = _checked(robot, frames)
+    frames = _check_frames(robot, frames)
     count = len(frames.theta)
     if not 0 < seconds < np.inf:
         raise ValueError(f"`seconds` is {seconds!r}; it must be positive and finite.")
@@ -234,7 +234,7 @@ def check_animation(file: str | os.PathLike[str]) -> File:
     return check_writable(file)
 
 
-def _checked(robot: Robot, frames: Frames) -> Frames:
+def _check_frames(robot: Robot, frames: Frames) -> Frames:
     theta, rotation = (np.asarray(as_numbers(name, x), float) for name, x in zip(Frames._fields, frames, strict=True))
     if theta.ndim != 2 or theta.shape[1] != robot.joints or not len(theta) or not np.isfinite(theta).all():
         raise ValueError(f"`theta` has shape {theta.shape}; for {robot.name!r} it must be (m, {robot.joints}), finite.")
@@ -247,7 +247,7 @@ def _checked(robot: Robot, frames: Frames) -> Frames:
 
 def _extent(robot: Robot, frames: Frames) -> tuple[np.ndarray, np.ndarray]:
     """Corners of the box about all frames."""
-    points = [posed_faces(robot, *pose)[0].reshape(-1, 3) for pose in zip(*frames, strict=True)]
+    points = [faces_at_pose(robot, *pose)[0].reshape(-1, 3) for pose in zip(*frames, strict=True)]
     return np.min([p.min(0) for p in points], axis=0), np.max([p.max(0) for p in points], axis=0)
 
 

@@ -116,7 +116,7 @@ def history_figure(
     above.set_title(title or robot.name, loc="left", pad=48, fontsize=13, fontweight="bold", color=INK)
     end = np.rad2deg(tilt_and_roll(history)[-1])
     tilt = float(np.hypot(*end[:2]))
-    result = f"net rotation: rolls {_signed(end[2])} about z, and the z axis tips by {tilt:.1f}°"
+    result = f"net rotation: rolls {_signed_text(end[2])} about z, and the z axis tips by {tilt:.1f}°"
     above.annotate(result, (0, 1), (0, 30), "axes fraction", "offset points", fontsize=10.5, color=INK)
     return figure
 
@@ -130,6 +130,6 @@ def _name_edges(axes: Axes, names: Sequence[str] | None, edges: int) -> None:
     axes.set_xlabel("along the path, edge by edge", color=INK)
 
 
-def _signed(angle: float) -> str:
+def _signed_text(angle: float) -> str:
     text = f"{angle:+.1f}°".replace("-", "\u2212")
     return "0.0°" if text[1:] == "0.0°" else text

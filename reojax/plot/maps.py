@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from reojax._internal.arrays import Array
 from reojax.plot._style import GREY, INK, PALE
 from reojax.plot._view import View
-from reojax.plot.robots import draw_robot_flat, posed_faces
+from reojax.plot.robots import draw_robot_flat, faces_at_pose
 from reojax.robot import Robot
 
 LINES = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", INK)
@@ -160,7 +160,7 @@ def draw_poses(
     view = View() if view is None else view
     pose = np.zeros(each[0].joints) if theta is None else theta
     seen = [
-        posed_faces(r, pose, turn)[0] @ view.camera().T for r, turn in zip(each, turns.reshape(-1, 3, 3), strict=True)
+        faces_at_pose(r, pose, turn)[0] @ view.camera().T for r, turn in zip(each, turns.reshape(-1, 3, 3), strict=True)
     ]
     scale = 0.42 / max(np.abs(points[..., :2]).max() for points in seen)
     for k, (robot, turn) in enumerate(zip(each, turns.reshape(-1, 3, 3), strict=True)):

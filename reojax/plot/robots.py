@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from reojax._internal.arrays import as_numbers
 from reojax.plot._solids import Faces, joint_faces, link_faces
 from reojax.plot._style import BASE, INK, LINKS
-from reojax.plot._view import View, check_view, shaded
+from reojax.plot._view import View, check_view, shade
 from reojax.robot import Robot
 
 
@@ -60,8 +60,8 @@ def draw_robot(
     view = View() if view is None else view
     check_view(view)
     place = _vector("position", position, 3)
-    faces, colours = posed_faces(robot, theta, rotation)
-    rgb = shaded(faces, colours, view)
+    faces, colours = faces_at_pose(robot, theta, rotation)
+    rgb = shade(faces, colours, view)
     body = Poly3DCollection(faces + place, facecolors=rgb, edgecolors=rgb, linewidths=0.3, alpha=alpha)
     body.set_gid(f"robot {robot.name}")
     axes.add_collection3d(body)
@@ -105,12 +105,12 @@ def draw_robot_flat(
     """
     view = View() if view is None else view
     check_view(view)
-    faces, colours = posed_faces(robot, theta, rotation)
+    faces, colours = faces_at_pose(robot, theta, rotation)
     camera = view.camera()
     seen = faces @ camera.T
     towards = np.cross(seen[:, 2] - seen[:, 0], seen[:, 3] - seen[:, 1])[:, 2] > 0
     order = np.flatnonzero(towards)[np.argsort(seen[towards, :, 2].mean(1))]
-    rgb = shaded(faces, colours, view)[order]
+    rgb = shade(faces, colours, view)[order]
     polygons = seen[order][:, :, :2] * np.broadcast_to(scale, 2) + np.asarray(at, float)
     body = PolyCollection(list(polygons), facecolors=rgb, edgecolors=rgb, linewidths=0.3, alpha=alpha, zorder=2)
     body.set_gid(f"robot {robot.name}")
@@ -128,7 +128,7 @@ def draw_axes(axes: Axes3D, length: float, *, at: ArrayLike = (0.0, 0.0, 0.0), n
     return axes
 
 
-def posed_faces(robot: Robot, theta: ArrayLike, rotation: ArrayLike | None = None) -> tuple[Faces, list[str]]:
+def faces_at_pose(robot: Robot, theta: ArrayLike, rotation: ArrayLike | None = None) -> tuple[Faces, list[str]]:
     """Faces of a robot at a pose about its centre of mass, in inertial components [m], and their colours.
 
     Raises:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reojax._internal.display_units import shown
+from reojax._internal.display_units import display_unit
 from reojax.plot._style import GREY, INK, PALE
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def sweep_figure(sweep: "Sweep", *, title: str | None = None, results: Sequence[
     Raises:
         ValueError: if a result is unknown or no scalar, or all axes have one value.
     """
-    names = _chosen(sweep, results)
+    names = _choose(sweep, results)
     free = [k for k, side in enumerate(sweep.shape) if side > 1]
     if not free:
         raise ValueError("all axes of the sweep have one value; a picture needs one of two values or more.")
@@ -64,7 +64,7 @@ def draw_result(axes: Axes, sweep: "Sweep", name: str, drawn: Sequence[str], pla
         drawn: dimensions to draw over.
         place: index of the results that leaves these dimensions.
     """
-    values = np.asarray(sweep.arrays()[name], float)[place] * shown(sweep.units.get(name, ""))[1]
+    values = np.asarray(sweep.arrays()[name], float)[place] * display_unit(sweep.units.get(name, ""))[1]
     values = np.ma.masked_invalid(values)
     axes.set_xlabel(_label(sweep, drawn[0]), color=INK)
     axes.set_title(_label(sweep, name), loc="left", fontsize=11, color=INK)
@@ -88,7 +88,7 @@ def draw_result(axes: Axes, sweep: "Sweep", name: str, drawn: Sequence[str], pla
     return axes
 
 
-def _chosen(sweep: "Sweep", results: Sequence[str] | None) -> list[str]:
+def _choose(sweep: "Sweep", results: Sequence[str] | None) -> list[str]:
     sides = len(sweep.shape)
     scalar = [name for name, values in sweep.arrays().items() if values.ndim == sides and values.dtype.kind in "biuf"]
     for name in results or ():
@@ -103,16 +103,16 @@ def _chosen(sweep: "Sweep", results: Sequence[str] | None) -> list[str]:
 def _shown_axis(sweep: "Sweep", dimension: str) -> np.ndarray:
     if dimension not in sweep.axes:  # a list of designs
         return np.arange(sweep.shape[0])
-    return np.asarray(sweep.axes[dimension], float) * shown(sweep.units.get(dimension, ""))[1]
+    return np.asarray(sweep.axes[dimension], float) * display_unit(sweep.units.get(dimension, ""))[1]
 
 
 def _label(sweep: "Sweep", name: str) -> str:
-    unit, _ = shown(sweep.units.get(name, ""))
+    unit, _ = display_unit(sweep.units.get(name, ""))
     words = name.replace("_", " ")
     return f"{words} [{unit.replace('^2', '²')}]" if unit else words
 
 
 def _at(sweep: "Sweep", dimension: str, index: slice | int) -> str:
-    unit, _ = shown(sweep.units.get(dimension, ""))
+    unit, _ = display_unit(sweep.units.get(dimension, ""))
     value = _shown_axis(sweep, dimension)[index]
     return f"{dimension.replace('_', ' ')} {value:.6g} {unit.replace('^2', '²')}".rstrip()

@@ -3,13 +3,13 @@
 from collections.abc import Callable
 
 from reojax.robot import Robot
-from reojax.robots.planar import planar as planar
-from reojax.robots.prototype import (
-    prototype as prototype,
+from reojax.robots.edits import (
     with_end_inertia as with_end_inertia,
     with_gear_ratio as with_gear_ratio,
     with_rotor_inertia as with_rotor_inertia,
 )
+from reojax.robots.planar import planar as planar
+from reojax.robots.prototype import prototype as prototype
 from reojax.robots.six_body import six_body as six_body
 from reojax.robots.two_cylinder_cat import two_cylinder_cat as two_cylinder_cat
 

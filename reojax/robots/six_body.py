@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from reojax.manoeuvres import SIX_BODY
 from reojax.robot import Robot, make_robot
 from reojax.robots.parts import half_turn_y
 from reojax.robots.prototype import (
@@ -48,5 +49,6 @@ def six_body() -> Robot:
         upper=upper,
         link_names=["foot1", "shank1", "middle1", "middle2", "shank2", "foot2"],
         joint_names=["fold1", "twist1", "bend", "twist2", "fold2"],
+        layout=SIX_BODY,
         name="six_body",
     )

@@ -28,7 +28,7 @@ CHUNKS = 16
 """Chunks that a sweep is cut into at least, as long as they are not smaller than a block."""
 
 
-class Cut(NamedTuple):
+class Chunking(NamedTuple):
     """The designs of a sweep in chunks of `chunk`, run as `blocks` blocks of `block` designs."""
 
     total: int
@@ -46,7 +46,7 @@ class Cut(NamedTuple):
         return number * self.chunk, min((number + 1) * self.chunk, self.total)
 
 
-def cut(count: int, chunk_size: int | None, bytes_per_design: int, platform: str) -> Cut:
+def chunking(count: int, chunk_size: int | None, bytes_per_design: int, platform: str) -> Chunking:
     """Choose the sizes for `count` designs.
 
     Raises:
@@ -63,7 +63,7 @@ def cut(count: int, chunk_size: int | None, bytes_per_design: int, platform: str
             raise ValueError(f"`chunk_size` is {chunk_size!r}; it must be a positive integer.")
         chunk = min(int(chunk_size), count)
         block = -(-chunk // -(-chunk // largest))
-    return Cut(count, chunk, block, -(-chunk // block))
+    return Chunking(count, chunk, block, -(-chunk // block))
 
 
 class Chunk(NamedTuple):
@@ -80,24 +80,24 @@ class Program(NamedTuple):
     """The compiled program of a sweep on a mesh of devices: one chunk for each of them."""
 
     designs: Designs
-    cut: Cut
+    slicing: Chunking
     mesh: Mesh
     run: Callable[[dict[str, jax.Array]], Any]
 
     def start(self, chunks: Sequence[int | None]) -> Any:
         """Start the computation of one chunk per device (None: nothing to do there, a chunk is done twice)."""
         todo = [next(c for c in chunks if c is not None) if c is None else c for c in chunks]
-        blocks = self.cut.blocks
+        blocks = self.slicing.blocks
         sharding = NamedSharding(self.mesh, PartitionSpec("device"))
         columns: dict[int, dict[str, np.ndarray]] = {}
 
         def part(name: str, where: Any) -> np.ndarray:
             chunk = todo[(where[0].start or 0) // blocks]
             if chunk not in columns:
-                columns[chunk] = self._padded(chunk)
+                columns[chunk] = self._pad(chunk)
             return columns[chunk][name]
 
-        shape = (len(todo) * blocks, self.cut.block)
+        shape = (len(todo) * blocks, self.slicing.block)
         return self.run(
             {
                 name: jax.make_array_from_callback(shape, sharding, lambda where, name=name: part(name, where))
@@ -112,7 +112,7 @@ class Program(NamedTuple):
 
     def results(self, started: Any, chunk: int, device: Any) -> list[np.ndarray]:
         """Wait for a chunk of this process: the function's arrays, the chunk's designs in front."""
-        start, stop = self.cut.bounds(chunk)
+        start, stop = self.slicing.bounds(chunk)
         found = []
         for leaf in jax.tree.leaves(started):
             shard = next(shard for shard in leaf.addressable_shards if shard.device == device)
@@ -120,17 +120,17 @@ class Program(NamedTuple):
             found.append(values.reshape(-1, *values.shape[2:])[: stop - start])
         return found
 
-    def _padded(self, chunk: int) -> dict[str, np.ndarray]:
+    def _pad(self, chunk: int) -> dict[str, np.ndarray]:
         """Designs of a chunk in blocks; the last one is repeated to fill them."""
-        size = self.cut.blocks * self.cut.block
-        columns = self.designs.stretch(*self.cut.bounds(chunk))
+        size = self.slicing.blocks * self.slicing.block
+        columns = self.designs.stretch(*self.slicing.bounds(chunk))
         return {
-            name: np.pad(column, (0, size - len(column)), mode="edge").reshape(self.cut.blocks, self.cut.block)
+            name: np.pad(column, (0, size - len(column)), mode="edge").reshape(self.slicing.blocks, self.slicing.block)
             for name, column in columns.items()
         }
 
 
-def compiled(function: Callable[..., Any], designs: Designs, cut: Cut, mesh: Mesh) -> Program:
+def compile_chunk(function: Callable[..., Any], designs: Designs, slicing: Chunking, mesh: Mesh) -> Program:
     """Compile the program that runs one chunk on each device of `mesh`."""
 
     def on_device(design: dict[str, jax.Array]) -> Any:
@@ -138,9 +138,9 @@ def compiled(function: Callable[..., Any], designs: Designs, cut: Cut, mesh: Mes
 
     place = PartitionSpec("device")
     everywhere = jax.shard_map(on_device, mesh=mesh, in_specs=place, out_specs=place, check_vma=False)
-    shape = (mesh.size * cut.blocks, cut.block)
+    shape = (mesh.size * slicing.blocks, slicing.block)
     sharding = NamedSharding(mesh, place)
     arguments = {
         name: jax.ShapeDtypeStruct(shape, values.dtype, sharding=sharding) for name, values in designs.axes.items()
     }
-    return Program(designs, cut, mesh, jax.jit(everywhere).lower(arguments).compile())
+    return Program(designs, slicing, mesh, jax.jit(everywhere).lower(arguments).compile())

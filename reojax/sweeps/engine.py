@@ -9,7 +9,7 @@ import jax
 import numpy as np
 from jax.sharding import Mesh
 
-from reojax.sweeps.chunks import Chunk, Program, compiled
+from reojax.sweeps.chunks import Chunk, Program, compile_chunk
 from reojax.sweeps.outputs import Outputs, bad_rows, blank
 
 IN_FLIGHT = 1
@@ -24,14 +24,14 @@ def run(function: Callable[..., Any], program: Program, outputs: Outputs, todo: 
         chunks: list[int | None] = list(islice(numbers, program.mesh.size))
         if chunks:
             chunks += [None] * (program.mesh.size - len(chunks))
-            under_way.append((_started(program, chunks), chunks))
+            under_way.append((_start(program, chunks), chunks))
         if under_way and (not chunks or len(under_way) > IN_FLIGHT):
-            yield from _finished(program, fallback, outputs, *under_way.popleft())
+            yield from _finish(program, fallback, outputs, *under_way.popleft())
         elif not chunks:
             return
 
 
-def _started(program: Program, chunks: list[int | None]) -> Any:
+def _start(program: Program, chunks: list[int | None]) -> Any:
     try:
         with jax.debug_nans(False):  # a sweep tells of them itself
             return program.start(chunks)
@@ -39,11 +39,11 @@ def _started(program: Program, chunks: list[int | None]) -> Any:
         return None
 
 
-def _finished(
+def _finish(
     program: Program, fallback: "_Fallback", outputs: Outputs, started: Any, chunks: list[int | None]
 ) -> Iterator[Chunk]:
     for number, device in program.here(chunks).items():
-        start, _ = program.cut.bounds(number)
+        start, _ = program.slicing.bounds(number)
         try:
             found = None if started is None else program.results(started, number, device)
         except Exception:
@@ -65,7 +65,7 @@ class _Fallback:
         """Results of the chunk, and why designs failed by their row in it."""
         if self.alone is None:
             mesh = Mesh(self.program.mesh.local_mesh.devices.ravel()[:1], self.program.mesh.axis_names)
-            self.alone = compiled(self.function, self.program.designs, self.program.cut, mesh)
+            self.alone = compile_chunk(self.function, self.program.designs, self.program.slicing, mesh)
         try:
             with jax.debug_nans(False):
                 started = self.alone.start([number])
@@ -73,7 +73,7 @@ class _Fallback:
         except Exception as error:
             if "RESOURCE_EXHAUSTED" in str(error):
                 raise ValueError("a chunk does not fit into memory; choose a smaller `chunk_size`.") from error
-        start, stop = self.program.cut.bounds(number)
+        start, stop = self.program.slicing.bounds(number)
         results, failed = blank(self.outputs, stop - start), {}
         columns = self.program.designs.stretch(start, stop)
         for row in range(stop - start):

@@ -80,7 +80,7 @@ def check_axes(axes: Mapping[str, ArrayLike]) -> Designs:
     checked = {name: _check_axis(name, values) for name, values in axes.items()}
     lengths = {name: len(values) for name, values in checked.items()}
     if isinstance(axes, Zipped) and len(set(lengths.values())) > 1:
-        raise ValueError(f"zipped axes must be equally long; they have {_listed(lengths)} values.")
+        raise ValueError(f"zipped axes must be equally long; they have {_as_list(lengths)} values.")
     return Designs(checked, isinstance(axes, Zipped))
 
 
@@ -126,5 +126,5 @@ def _check_axis(name: str, values: ArrayLike) -> np.ndarray:
     return array
 
 
-def _listed(numbers: Mapping[str, int]) -> str:
+def _as_list(numbers: Mapping[str, int]) -> str:
     return ", ".join(f"{name} {number}" for name, number in numbers.items())

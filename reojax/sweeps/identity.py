@@ -12,7 +12,7 @@ import jax
 import numpy as np
 
 from reojax.robot import Robot
-from reojax.sweeps.chunks import Cut
+from reojax.sweeps.chunks import Chunking
 from reojax.sweeps.grid import Designs
 from reojax.sweeps.outputs import Outputs, scalars
 
@@ -21,7 +21,7 @@ SCHEMA = "reojax-sweep-store-1"
 
 
 def identity(
-    function: Callable[..., Any], designs: Designs, outputs: Outputs, sizes: Cut, platform: str
+    function: Callable[..., Any], designs: Designs, outputs: Outputs, sizes: Chunking, platform: str
 ) -> dict[str, Any]:
     """Return all that results depend on, as plain data.
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from reojax.sweeps.chunks import Chunk, Cut
+from reojax.sweeps.chunks import Chunk, Chunking
 from reojax.sweeps.grid import Designs
 from reojax.sweeps.outputs import Output, bytes_per_design
 
@@ -13,7 +13,7 @@ from reojax.sweeps.outputs import Output, bytes_per_design
 class Memory:
     """Arrays that are filled chunk by chunk."""
 
-    def __init__(self, outputs: tuple[Output, ...], sizes: Cut, advice: str) -> None:
+    def __init__(self, outputs: tuple[Output, ...], sizes: Chunking, advice: str) -> None:
         """Make room for the results.
 
         Raises:

@@ -32,12 +32,12 @@ def merge(*folders: str | os.PathLike[str]) -> Sweep:
         if store.hash != stores[0].hash:
             other = "; ".join(differences(stores[0].identity, store.identity))
             raise ValueError(f"{str(stores[0].folder)!r} and {str(store.folder)!r} hold different sweeps: {other}.")
-    arrays, failures = assembled(stores)
+    arrays, failures = assemble(stores)
     results = {output.name: array for output, array in zip(stores[0].outputs, arrays, strict=True)}
     return Sweep(stores[0].designs, stores[0].units, lambda: results, failures)
 
 
-def assembled(stores: Sequence[Store]) -> tuple[list[Any], dict[int, str]]:
+def assemble(stores: Sequence[Store]) -> tuple[list[Any], dict[int, str]]:
     """Results with the grid's shape in front, and the bad designs.
 
     Raises:

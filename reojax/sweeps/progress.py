@@ -4,13 +4,13 @@ from collections.abc import Iterable
 
 from tqdm import tqdm
 
-from reojax.sweeps.chunks import Cut
+from reojax.sweeps.chunks import Chunking
 
 
 class Progress:
     """A bar that counts designs, chunk by chunk."""
 
-    def __init__(self, sizes: Cut, chunks: Iterable[int], *, show: bool, done: Iterable[int] = (), alike: int = 1):
+    def __init__(self, sizes: Chunking, chunks: Iterable[int], *, show: bool, done: Iterable[int] = (), alike: int = 1):
         """Begin to show.
 
         Args:

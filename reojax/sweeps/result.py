@@ -99,17 +99,17 @@ class Sweep:
         except ImportError as error:
             raise ImportError("`to_xarray` needs xarray: pip install 'reojax[xarray]'.") from error
 
-        def labelled(name: str, dimensions: tuple[str, ...], values: np.ndarray) -> tuple[Any, ...]:
+        def label(name: str, dimensions: tuple[str, ...], values: np.ndarray) -> tuple[Any, ...]:
             return dimensions, values, {"units": self.units[name]} if name in self.units else {}
 
         inner = {name: values.shape[len(self.shape) :] for name, values in self.arrays().items()}
         variables = {
-            name: labelled(name, (*self.dimensions, *(f"{name}_{i}" for i in range(len(inner[name])))), values)
+            name: label(name, (*self.dimensions, *(f"{name}_{i}" for i in range(len(inner[name])))), values)
             for name, values in self.arrays().items()
         }
         zipped = self._designs.zipped
         coordinates = {
-            name: labelled(name, self.dimensions if zipped else (name,), values) for name, values in self.axes.items()
+            name: label(name, self.dimensions if zipped else (name,), values) for name, values in self.axes.items()
         }
         return xarray.Dataset(variables, coordinates, {"source": "reojax.sweep"})
 

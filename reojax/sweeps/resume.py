@@ -10,7 +10,7 @@ import jax
 import numpy as np
 from jax.sharding import Mesh
 
-from reojax.sweeps.chunks import compiled
+from reojax.sweeps.chunks import compile_chunk
 from reojax.sweeps.engine import run
 from reojax.sweeps.outputs import Outputs
 from reojax.sweeps.progress import Progress
@@ -49,7 +49,7 @@ def complete(
 
         try:
             if missing:
-                for chunk in run(function, compiled(function, store.designs, store.sizes, mesh), outputs, todo()):
+                for chunk in run(function, compile_chunk(function, store.designs, store.sizes, mesh), outputs, todo()):
                     store.put(chunk)
                     found[chunk.number] = chunk.bad
                     shown.add(chunk.number)

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from reojax._internal.files import replacing
-from reojax.sweeps.chunks import Chunk, Cut
+from reojax.sweeps.chunks import Chunk, Chunking
 from reojax.sweeps.grid import Designs
 from reojax.sweeps.identity import SCHEMA, axis_identity, differences, digest
 from reojax.sweeps.outputs import Output
@@ -45,7 +45,7 @@ class Store:
             for output in self.identity["results"]
         )
         chunk, block = self.identity["chunk"], self.identity["block"]
-        self.sizes = Cut(designs.total, chunk, block, -(-chunk // block))
+        self.sizes = Chunking(designs.total, chunk, block, -(-chunk // block))
 
     def file(self, number: int) -> Path:
         """Path of a chunk."""

@@ -10,13 +10,13 @@ import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reojax.sweeps.chunks import compiled, cut
+from reojax.sweeps.chunks import chunking, compile_chunk
 from reojax.sweeps.devices import Devices, at_most, mesh_of
 from reojax.sweeps.engine import run
 from reojax.sweeps.grid import Designs, check_axes, check_function
 from reojax.sweeps.identity import identity
 from reojax.sweeps.memory import Memory
-from reojax.sweeps.merge import assembled
+from reojax.sweeps.merge import assemble
 from reojax.sweeps.outputs import Outputs, bytes_per_design, outputs_of
 from reojax.sweeps.progress import Progress
 from reojax.sweeps.result import Sweep
@@ -71,7 +71,7 @@ def sweep(
         ValueError: naming what is wrong with the arguments, or how the store's sweep differs. A design that
             fails raises nothing: it is logged, its results are NaN, and `Sweep.bad` has it.
     """
-    found = computed(function, axes, chunk_size, store, devices, progress, units, shard)
+    found = run_sweep(function, axes, chunk_size, store, devices, progress, units, shard)
     if bad := found.bad:
         lines = [f"{len(bad)} of {prod(found.shape)} designs gave no finite result:"]
         lines += [f"  {design}" for design in bad[:_TOLD]]
@@ -79,7 +79,7 @@ def sweep(
     return found
 
 
-def computed(
+def run_sweep(
     function: Callable[..., Any],
     axes: Mapping[str, ArrayLike],
     chunk_size: int | None,
@@ -93,18 +93,18 @@ def computed(
     designs = check_axes(axes)
     check_function(function, designs)
     mesh = mesh_of(devices)
-    first, parts = _checked_shard(shard, store)
+    first, parts = _check_shard(shard, store)
     if store is None and jax.process_count() > 1:
         raise ValueError("several processes put their results into a `store`; give the folder.")
     outputs = outputs_of(function, designs)
-    labels = _checked_units(units, designs, outputs)
+    labels = _check_units(units, designs, outputs)
     platform = mesh.devices.flat[0].platform
-    sizes = cut(designs.total, chunk_size, bytes_per_design(outputs.arrays), platform)
+    sizes = chunking(designs.total, chunk_size, bytes_per_design(outputs.arrays), platform)
     mine = range(first, sizes.chunks, parts)
     mesh = at_most(mesh, len(mine))
     if store is None:
         memory = Memory(outputs.arrays, sizes, "give a `store`")
-        program = compiled(function, designs, sizes, mesh)
+        program = compile_chunk(function, designs, sizes, mesh)
         try:
             with Progress(sizes, mine, show=progress) as shown:
                 for chunk in run(function, program, outputs, mine):
@@ -117,11 +117,11 @@ def computed(
     else:
         kept = create(store, identity(function, designs, outputs, sizes, platform), designs, labels)
         failures = complete(function, outputs, kept, mesh, mine, progress)
-        load = lambda: assembled([kept])[0]
+        load = lambda: assemble([kept])[0]
     return Sweep(designs, labels, lambda: jax.tree.unflatten(outputs.structure, load()), failures)
 
 
-def _checked_shard(shard: tuple[int, int] | None, store: object) -> tuple[int, int]:
+def _check_shard(shard: tuple[int, int] | None, store: object) -> tuple[int, int]:
     if shard is None:
         return 0, 1
     pair = shard if isinstance(shard, Sequence) and len(shard) == 2 else (0, 0)
@@ -132,7 +132,7 @@ def _checked_shard(shard: tuple[int, int] | None, store: object) -> tuple[int, i
     return pair
 
 
-def _checked_units(units: Mapping[str, str] | None, designs: Designs, outputs: Outputs) -> dict[str, str]:
+def _check_units(units: Mapping[str, str] | None, designs: Designs, outputs: Outputs) -> dict[str, str]:
     labels = dict(units or {})
     known = (*designs.axes, *outputs.names)
     for name, unit in labels.items():

@@ -73,11 +73,11 @@ def test_the_truth_lies_within_the_stated_uncertainty(synthetic):
 def test_the_derivatives_are_those_of_the_residuals(synthetic, exact):
     """Gauss-Newton's derivatives against differences, and the pull of the joints' noise against a push."""
     from reojax.captures.calibration import _Problem
-    from reojax.captures.parameters import chosen
+    from reojax.captures.parameters import resolve
 
     capture, _ = exact
     robot = robots.prototype()
-    fitted = chosen(robot, PAIR)
+    fitted = resolve(robot, PAIR)
     problem = _Problem(robot, capture, fitted, True)
     x = np.array([synthetic.END_INERTIA, synthetic.ROTOR_INERTIA])
     state = problem.settled(x)

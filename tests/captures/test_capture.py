@@ -195,7 +195,7 @@ def test_time_is_aligned_below_a_frame(with_joints):
     rng = np.random.default_rng(2)
     when = np.sort(rng.choice(np.arange(-0.1, 0.9, 1 / 200), 160, replace=False))
     late = 5.012345
-    at = comparison.interpolated(MOTION.time, MOTION.rotation)(when)
+    at = comparison.interpolate(MOTION.time, MOTION.rotation)(when)
     joints = np.stack([np.interp(when, MOTION.time, column) for column in MOTION.theta.T], axis=1)
     cameras = Rotation.from_rotvec([0.3, -2.0, 0.7]).as_matrix()
     capture = reojax.make_capture(when + late, joints if with_joints else None, cameras @ at)
@@ -232,7 +232,7 @@ def test_a_capture_at_rest_has_no_offset():
 def test_gaps_in_the_joints_are_filled():
     holes = THETA.copy()
     holes[60:64] = holes[100:103, 1] = np.nan
-    filled = comparison.filled(reojax.make_capture(TIME, holes))
+    filled = comparison.fill_gaps(reojax.make_capture(TIME, holes))
     np.testing.assert_allclose(filled, THETA, atol=2e-3)
     np.testing.assert_array_equal(filled[np.isfinite(holes)], holes[np.isfinite(holes)])
 

@@ -10,7 +10,7 @@ from reojax import design, joint_travel, so3
 from reojax.design import Problem, Variable
 from reojax.robots.random import random_robot
 
-ROBOT = random_robot(3, 3, limits=(-1.5, 2.0))
+ROBOT = random_robot(3, 3, limits=(-1.5, 2.0)).replace(layout=reojax.FOUR_BODY)
 PROTOTYPE = reojax.robots.prototype()
 FAMILIES = {
     "rectangle": design.rectangles(ROBOT),

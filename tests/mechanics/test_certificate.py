@@ -8,7 +8,7 @@ import pytest
 import reojax
 from reojax import robots, so3
 from reojax.mechanics import certificate
-from reojax.mechanics.certificate import certified_rotation, certify, edge_momentum, momentum_residual
+from reojax.mechanics.certificate import certify, certify_rotation, edge_momentum, momentum_residual
 
 A = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
 SAMPLES = 128
@@ -16,7 +16,7 @@ SAMPLES = 128
 
 @pytest.fixture(scope="module")
 def certified():
-    return certified_rotation(robots.prototype(), A, steps=8, samples=SAMPLES)
+    return certify_rotation(robots.prototype(), A, steps=8, samples=SAMPLES)
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def test_a_right_answer_has_a_small_certificate(certified):
 
 def test_a_coarse_step_shows():
     """One step per edge is told by halving and by the end of the motion, and by how much."""
-    found, rotation, history = certified_rotation(robots.prototype(), A, steps=1)
+    found, rotation, history = certify_rotation(robots.prototype(), A, steps=1)
     error = so3.angle(rotation.T @ history[-1])
     assert error > 1e-5
     assert found.endpoint == pytest.approx(float(error), rel=1e-6)

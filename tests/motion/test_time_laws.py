@@ -8,7 +8,7 @@ from scipy.interpolate import PPoly
 import reojax
 from reojax.motion.splines import least_jerk
 from reojax.motion.time_laws import LAWS
-from reojax.motion.trajectory import overlapped, stretched
+from reojax.motion.trajectory import overlap_pieces, stretch
 
 PATH = reojax.polygon([[0.0, 1.0], [2.0, 1.0], [2.0, -1.0]])
 
@@ -67,7 +67,7 @@ def test_along_and_at():
         ahead, behind, here = at(t + 1e-5), at(t - 1e-5), at(t)
         np.testing.assert_allclose((ahead.theta - behind.theta) / 2e-5, here.theta_dot, atol=1e-6)
         np.testing.assert_allclose((ahead.theta_dot - behind.theta_dot) / 2e-5, here.theta_ddot, atol=1e-6)
-    slower = stretched(trajectory, 2.0)
+    slower = stretch(trajectory, 2.0)
     np.testing.assert_allclose(slower.at(0.5).theta_ddot, trajectory.at(0.25).theta_ddot / 4, atol=1e-12)
 
 
@@ -83,11 +83,11 @@ def test_moves_one_after_the_other_do_not_overlap(law):
     """Each in the time of its edge they make the motion along the path; started earlier they round the corner."""
     law = LAWS[law]()
     moves, edge = ((0, 0), (1, 1)), reojax.along(PATH, law, [0.5, 2.0])
-    apart = overlapped(PATH.waypoints, law, np.array([0.0, 0.5]), np.array([0.5, 2.0]), moves)
+    apart = overlap_pieces(PATH.waypoints, law, np.array([0.0, 0.5]), np.array([0.5, 2.0]), moves)
     for t in (0.1, 0.26, 0.49, 0.9, 2.2, 2.5):
         for got, expected in zip(apart.at(t), edge.at(t), strict=True):
             np.testing.assert_allclose(got, expected, atol=1e-10)
-    early = overlapped(PATH.waypoints, law, np.array([0.0, 0.2]), np.array([0.5, 2.0]), moves)
+    early = overlap_pieces(PATH.waypoints, law, np.array([0.0, 0.2]), np.array([0.5, 2.0]), moves)
     assert early.duration == pytest.approx(2.2)
     assert np.abs(early.at(0.35).theta_dot).min() > 0.1
 

@@ -12,7 +12,7 @@ import reojax
 from reojax import plot, robots
 from reojax.mechanics.kinematics import kinematics
 from reojax.plot import _solids
-from reojax.plot.robots import posed_faces, poses
+from reojax.plot.robots import faces_at_pose, poses
 from reojax.robots.random import random_robot
 
 PROTOTYPE = robots.prototype()
@@ -94,7 +94,7 @@ def test_draw_robot_draws_onto_the_axes_it_is_given():
     axes = space()
     assert plot.draw_robot(axes, PROTOTYPE, [0.1, 0.2, 0.3], TURN, centres=True) is axes
     (body,) = (c for c in axes.collections if isinstance(c, Poly3DCollection))
-    faces, colours = posed_faces(PROTOTYPE, [0.1, 0.2, 0.3], TURN)
+    faces, colours = faces_at_pose(PROTOTYPE, [0.1, 0.2, 0.3], TURN)
     assert len(faces) == len(colours) == len(body.get_facecolor())
     low, high = extent(faces)
     limits = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
@@ -107,8 +107,8 @@ def test_draw_robot_draws_onto_the_axes_it_is_given():
 
 
 def test_a_rotation_turns_everything():
-    straight, _ = posed_faces(PROTOTYPE, np.zeros(3))
-    np.testing.assert_allclose(posed_faces(PROTOTYPE, np.zeros(3), TURN)[0], straight @ TURN.T, atol=1e-15)
+    straight, _ = faces_at_pose(PROTOTYPE, np.zeros(3))
+    np.testing.assert_allclose(faces_at_pose(PROTOTYPE, np.zeros(3), TURN)[0], straight @ TURN.T, atol=1e-15)
 
 
 def test_flat_and_spatial_pictures_agree():
@@ -129,7 +129,7 @@ def test_flat_and_spatial_pictures_agree():
     assert plot.draw_robot_flat(flat, PROTOTYPE, np.zeros(3), at=(5, 7), scale=2.0, view=view) is flat
     (body,) = flat.collections
     corners = np.concatenate([path.vertices for path in body.get_paths()])
-    seen = posed_faces(PROTOTYPE, np.zeros(3))[0].reshape(-1, 3) @ view.camera().T[:, :2] * 2 + [5, 7]
+    seen = faces_at_pose(PROTOTYPE, np.zeros(3))[0].reshape(-1, 3) @ view.camera().T[:, :2] * 2 + [5, 7]
     np.testing.assert_allclose(corners.max(0), seen.max(0), atol=2e-3)
 
 

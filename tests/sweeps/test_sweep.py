@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import reojax
-from reojax.sweeps.chunks import cut
+from reojax.sweeps.chunks import chunking
 
 
 def sums(x, y):
@@ -97,13 +97,13 @@ def test_many_more_designs_than_a_block():
     ],
 )
 def test_chunks_hold_blocks(total, chunk_size, expected):
-    sizes = cut(total, chunk_size, 24, "cpu")
+    sizes = chunking(total, chunk_size, 24, "cpu")
     assert sizes == (total, *expected)
     assert sizes.bounds(sizes.chunks - 1)[1] == total
 
 
 def test_chunks_of_large_results_are_smaller():
-    sizes = cut(10**6, None, 36_000, "cpu")
+    sizes = chunking(10**6, None, 36_000, "cpu")
     assert sizes.chunk * 36_000 <= 2**26
 
 

@@ -97,7 +97,7 @@ def _batch(args, axes, *, call: Call, batched: tuple[bool, ...], size: int | Non
         found = _blocks.bind(*moved, call=call, batched=now, size=more)
     else:
         merged = [
-            x if axis is None and not b else _merged(x, axis, b, more, size)
+            x if axis is None and not b else _merge(x, axis, b, more, size)
             for x, axis, b in zip(args, axes, batched, strict=True)
         ]
         now = tuple(b or axis is not None for axis, b in zip(axes, batched, strict=True))
@@ -106,7 +106,7 @@ def _batch(args, axes, *, call: Call, batched: tuple[bool, ...], size: int | Non
     return found, [0] * len(found)
 
 
-def _merged(x: jax.Array, axis: int | None, batched: bool, more: int, size: int) -> jax.Array:
+def _merge(x: jax.Array, axis: int | None, batched: bool, more: int, size: int) -> jax.Array:
     x = x[None] if axis is None else jnp.moveaxis(x, axis, 0)
     x = x if batched else x[:, None]
     return jnp.broadcast_to(x, (more, size, *x.shape[2:])).reshape(-1, *x.shape[2:])

@@ -25,7 +25,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from reojax.mechanics._fast.materialize import keep
+from reojax.mechanics._fast.materialize import materialize
 from reojax.mechanics._fast.nodes import LEGENDRE, NODES, WEIGHTS, per_step
 from reojax.mechanics._fast.quaternions import Quaternion, Triple, times
 from reojax.mechanics._fast.scalar import cross, dot, mul, plus, times as scale
@@ -91,30 +91,30 @@ def step_rotations(omega: Triple) -> Step:
     """
     s = jnp.asarray(np.tile(NODES - 0.5, omega[0].shape[0] // len(NODES)), omega[0].dtype)
     mean = _at_nodes(omega, _MEAN_AT_NODES)
-    u = keep(_rotate(scale(s, mean), plus(omega, scale(-1, mean))))
+    u = materialize(_rotate(scale(s, mean), plus(omega, scale(-1, mean))))
     turned = _at_nodes(u, _INTEGRAL)
-    v = keep(_fer(u, turned))
+    v = materialize(_fer(u, turned))
     m = _moments(v, _USED)
     first = m[0]
     for a, b in pairwise(m):
         first = plus(first, scale(0.5, cross(a, b)))
-    half = keep(_exp(scale(0.5, _moments(omega, 1)[0])))
-    inner = keep(times(_exp_small(first), _exp_small(_moments(u, 1)[0])))
-    rotation = keep(times(times(half, inner), half))
+    half = materialize(_exp(scale(0.5, _moments(omega, 1)[0])))
+    inner = materialize(times(_exp_small(first), _exp_small(_moments(u, 1)[0])))
+    rotation = materialize(times(times(half, inner), half))
 
     def turns() -> tuple[Triple, ...]:
         return scale(s, mean), turned, _at_nodes(v, _INTEGRAL)
 
     def inside(vectors: Triple) -> Triple:
         for turn in turns():
-            vectors = keep(_rotate(turn, vectors))
+            vectors = materialize(_rotate(turn, vectors))
         return vectors
 
     def back(vectors: Triple) -> Triple:
-        vectors = keep(_at_nodes(vectors, _SHARES))
+        vectors = materialize(_at_nodes(vectors, _SHARES))
         for turn in reversed(turns()):
             vectors = _rotate(scale(-1, turn), vectors)
-        return keep(vectors)
+        return materialize(vectors)
 
     return Step(rotation, half, inside, back)
 

@@ -18,13 +18,13 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
 
-def keep(vector: tuple[Any, ...]) -> tuple[Any, ...]:
+def materialize(vector: tuple[Any, ...]) -> tuple[Any, ...]:
     """Keep those components that are arrays, all of one shape and dtype; the others are single numbers."""
     places = [i for i, c in enumerate(vector) if isinstance(c, jax.Array) and c.ndim]
-    return tuple(_replaced(vector, places))
+    return tuple(_replace(vector, places))
 
 
-def _replaced(values: Any, places: list[int]) -> list[Any]:
+def _replace(values: Any, places: list[int]) -> list[Any]:
     kept = list(values)
     if places:
         for i, value in zip(places, _kept.bind(*(values[i] for i in places)), strict=True):
@@ -57,11 +57,11 @@ def _batch(values, axes):
 
 
 def _jvp(values, tangents):
-    return _kept.bind(*values), _replaced(tangents, _not_zero(tangents))
+    return _kept.bind(*values), _replace(tangents, _not_zero(tangents))
 
 
 def _transpose(cotangents, *_):
-    return _replaced(cotangents, _not_zero(cotangents))
+    return _replace(cotangents, _not_zero(cotangents))
 
 
 _kept = Primitive("kept")

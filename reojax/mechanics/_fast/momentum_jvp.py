@@ -5,8 +5,8 @@
 
 from collections.abc import Sequence
 
-from reojax.mechanics._fast.materialize import keep
-from reojax.mechanics._fast.parameters import Components
+from reojax.mechanics._fast.materialize import materialize
+from reojax.mechanics._fast.parameters import RobotScalars
 from reojax.mechanics._fast.recursion import apply_symmetric, joint_rotation
 from reojax.mechanics._fast.scalar import Matrix, Scalar, Symmetric, Vector, apply, cross, mul, plus, times, transpose
 
@@ -15,7 +15,7 @@ Pair = tuple[Vector, Vector]
 
 
 def angular_momentum(
-    robot: Components,
+    robot: RobotScalars,
     sine_cosine: Sequence[tuple[Scalar, Scalar]],
     rate: Sequence[Scalar],
     omega: Vector,
@@ -46,7 +46,7 @@ def angular_momentum(
 
 def kept(pair: Pair) -> Pair:
     """Keep both vectors together."""
-    six = keep((*pair[0], *pair[1]))
+    six = materialize((*pair[0], *pair[1]))
     return six[:3], six[3:]
 
 

@@ -21,9 +21,9 @@ exponential map at `theta e`. One pass outward for both motions and one inward f
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from reojax.mechanics._fast.materialize import keep
+from reojax.mechanics._fast.materialize import materialize
 from reojax.mechanics._fast.momentum_jvp import Pair, body_momentum, kept, onto_parent, outward
-from reojax.mechanics._fast.parameters import Components
+from reojax.mechanics._fast.parameters import RobotScalars
 from reojax.mechanics._fast.recursion import joint_rotation
 from reojax.mechanics._fast.scalar import (
     Scalar,
@@ -43,14 +43,14 @@ from reojax.mechanics._fast.scalar import (
 class Slopes(NamedTuple):
     """Derivatives of `mu . L` at all nodes."""
 
-    robot: Components
+    robot: RobotScalars
     """By each entry of the robot; by axes as far as they stay of unit length."""
     theta: list[Scalar]
     rate: list[Scalar]
 
 
 def slopes(
-    robot: Components,
+    robot: RobotScalars,
     sine_cosine: Sequence[tuple[Scalar, Scalar]],
     rate: Sequence[Scalar],
     omega: Vector,
@@ -80,7 +80,7 @@ def slopes(
         u = plus(w, times(mul(-1, rate[k]), e))
         turning[k] = plus(plus(cross(h_, u), cross(p_, v)), plus(cross(h, w_), cross(p, v_)))
         if not all(isinstance(c, int) for c in e):  # or else only one of the three is needed
-            turning[k] = keep(turning[k])
+            turning[k] = materialize(turning[k])
         pull[k] = plus(cross(p_, u), cross(p, w_))
         rotor = times(mul(rate[k], robot.rotor_spin[k]), e)
         momentum[parent] = onto_parent(E[k], robot.anchor[k], momentum[parent], momentum[link], rotor)
@@ -96,7 +96,7 @@ def slopes(
         by_axis.append(plus(turned, times(rate[k], moved)))
     motions = list(zip(actual, virtual, strict=True))
     return Slopes(
-        robot=Components(
+        robot=RobotScalars(
             mass=[dot(v, v_) for (_, v), (_, v_) in motions],
             moment=[plus(cross(v, w_), cross(v_, w)) for (w, v), (w_, v_) in motions],
             inertia=[_products(w, w_) for (w, _), (w_, _) in motions],
@@ -113,7 +113,7 @@ def slopes(
     )
 
 
-def together(robot: Components) -> Any:
+def fusion_groups(robot: RobotScalars) -> Any:
     """Name for each entry what is best computed in one loop with it, as it reads the same values."""
     links, joints = range(len(robot.mass)), range(len(robot.parent))
     names: dict[str, Any] = dict(
@@ -125,7 +125,7 @@ def together(robot: Components) -> Any:
         rotor_spin=[f"axis {k}" for k in joints],
         parent=robot.parent,
     )
-    return Components(**names)
+    return RobotScalars(**names)
 
 
 def _products(a: Vector, b: Vector) -> Symmetric:

@@ -22,17 +22,17 @@ from jax.custom_derivatives import SymbolicZero
 
 from reojax.mechanics._fast.blocking import Call, in_blocks
 from reojax.mechanics._fast.magnus import Step, mean_over_step, step_rotations
-from reojax.mechanics._fast.materialize import keep
+from reojax.mechanics._fast.materialize import materialize
 from reojax.mechanics._fast.momentum_jvp import angular_momentum
-from reojax.mechanics._fast.momentum_vjp import slopes, together
+from reojax.mechanics._fast.momentum_vjp import fusion_groups, slopes
 from reojax.mechanics._fast.nodes import NODES, path_nodes, sum_over_nodes, to_nodes, to_points
 from reojax.mechanics._fast.parameters import (
-    Components,
     Known,
     Parameters,
     Pattern,
+    RobotScalars,
     components,
-    flattened,
+    flatten,
     known_parameters,
     parameters,
     split,
@@ -44,7 +44,7 @@ from reojax.mechanics._fast.quaternions import (
     product,
     products_up_to,
     rotate,
-    shifted,
+    shift,
     times,
     to_matrix,
 )
@@ -54,7 +54,7 @@ from reojax.mechanics._fast.sincos import sincos
 from reojax.robot import Robot
 
 
-class Problem(NamedTuple):
+class RotationProblem(NamedTuple):
     """What is known while tracing."""
 
     steps: int
@@ -65,28 +65,28 @@ class Problem(NamedTuple):
     moved: bool = False
     """Whether it is by the path too."""
 
-    def robot(self, data: Sequence[jax.Array]) -> Components:
+    def robot(self, data: Sequence[jax.Array]) -> RobotScalars:
         """Put the known numbers in the place of the data."""
         return components([x if k is None else k for x, k in zip(data, self.known, strict=True)], self.parent)
 
 
 def steps_of_path(robot: Robot, pattern: Pattern, points: jax.Array, steps: int) -> Step:
     """Rotation over each of the `steps` steps of each edge, in order."""
-    problem = Problem(steps, robot.parent, known_parameters(robot, pattern))
-    return _steps_of_path(problem, flattened(parameters(robot)), points)
+    problem = RotationProblem(steps, robot.parent, known_parameters(robot, pattern))
+    return _steps_of_path(problem, flatten(parameters(robot)), points)
 
 
-def end_rotation(robot: Robot, pattern: Pattern, points: jax.Array, steps: int) -> jax.Array:
+def net_rotation(robot: Robot, pattern: Pattern, points: jax.Array, steps: int) -> jax.Array:
     """Rotation (3, 3) after the polygon `points` (v, j), v >= 2; all arrays of one dtype."""
-    problem = Problem(steps, robot.parent, known_parameters(robot, pattern))
+    problem = RotationProblem(steps, robot.parent, known_parameters(robot, pattern))
     return _end_rotation(problem, parameters(robot), points)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _end_rotation(problem: Problem, numbers: Parameters, points: jax.Array) -> jax.Array:
+def _end_rotation(problem: RotationProblem, numbers: Parameters, points: jax.Array) -> jax.Array:
     alive = 1 if points.shape[1] <= AT_ONCE else 4
     call = Call(_rotation, problem, ((3, 3),), alive * _nodes(problem, points))
-    return in_blocks(call, flattened(numbers), points)[0]
+    return in_blocks(call, flatten(numbers), points)[0]
 
 
 @partial(_end_rotation.defjvp, symbolic_zeros=True)
@@ -99,31 +99,31 @@ def _end_rotation_jvp(problem, primals, tangents):
         varied=tuple(not isinstance(c, SymbolicZero) for c in by_numbers for _ in range(c.size)),
         moved=not isinstance(by_points, SymbolicZero),
     )
-    changes = ([flattened(varied)] if varied else []) + [by_points] * problem.moved
+    changes = ([flatten(varied)] if varied else []) + [by_points] * problem.moved
     if not changes:
         return rotation, jnp.zeros_like(rotation)
     alive = max(4, points.shape[1])
     call = Call(_push, problem, ((3,),), alive * _nodes(problem, points), transpose=_pull, linear=len(changes))
-    turn = in_blocks(call, flattened(numbers), points, *changes)[0]
+    turn = in_blocks(call, flatten(numbers), points, *changes)[0]
     return rotation, jnp.cross(turn[:, None], rotation, axis=0)
 
 
-def _nodes(problem: Problem, points: jax.Array) -> int:
+def _nodes(problem: RotationProblem, points: jax.Array) -> int:
     """Size of a value at all nodes. (Blocks are smaller the more of them are `alive` at once, as measured.)"""
     return (points.shape[0] - 1) * problem.steps * len(NODES)
 
 
-def _rotation(problem: Problem, numbers: jax.Array, points: jax.Array) -> list[jax.Array]:
+def _rotation(problem: RotationProblem, numbers: jax.Array, points: jax.Array) -> list[jax.Array]:
     return [to_matrix(product(_steps_of_path(problem, numbers, points).rotation))]
 
 
-def _steps_of_path(problem: Problem, numbers: jax.Array, points: jax.Array) -> Step:
+def _steps_of_path(problem: RotationProblem, numbers: jax.Array, points: jax.Array) -> Step:
     theta, rate = path_nodes(points, problem.steps)
     base = inward(problem.robot(split(numbers)), [sincos(a) for a in theta], rate)
-    return step_rotations(keep(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0])))
+    return step_rotations(materialize(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0])))
 
 
-class Solution(NamedTuple):
+class NodeSolution(NamedTuple):
     """What derivatives read of the solution, kept."""
 
     theta: list[jax.Array]
@@ -140,22 +140,22 @@ class Solution(NamedTuple):
     """Attitude in which `step.inside` begins, from the start of the path, four arrays (steps,)."""
 
 
-def _solution(problem: Problem, data: list[jax.Array], points: jax.Array) -> Solution:
+def _solution(problem: RotationProblem, data: list[jax.Array], points: jax.Array) -> NodeSolution:
     theta, rate = path_nodes(points, problem.steps)
-    sine_cosine = [keep(sincos(angle)) for angle in theta]
+    sine_cosine = [materialize(sincos(angle)) for angle in theta]
     robot = problem.robot(data)
     base = inward(robot, sine_cosine, rate, by_joint=not robot.axes_known)
-    moving = keep((*base.momentum, *base.drift))
-    centre, drift = keep(base.centre), moving[3:]
-    inertia = keep(base.inertia)
-    omega = keep(_at_nodes(solve(inertia, scale(-1, moving[:3])), theta[0]))
-    velocity = keep(scale(-1, plus(drift, cross(omega, centre))))
+    moving = materialize((*base.momentum, *base.drift))
+    centre, drift = materialize(base.centre), moving[3:]
+    inertia = materialize(base.inertia)
+    omega = materialize(_at_nodes(solve(inertia, scale(-1, moving[:3])), theta[0]))
+    velocity = materialize(scale(-1, plus(drift, cross(omega, centre))))
     step = step_rotations(omega)
-    to_step = keep(times(shifted(products_up_to(step.rotation), 1), step.half))
-    return Solution(theta, rate, sine_cosine, inertia, centre, omega, velocity, step, to_step)
+    to_step = materialize(times(shift(products_up_to(step.rotation), 1), step.half))
+    return NodeSolution(theta, rate, sine_cosine, inertia, centre, omega, velocity, step, to_step)
 
 
-def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax.Array) -> list[jax.Array]:
+def _push(problem: RotationProblem, numbers: jax.Array, points: jax.Array, *changes: jax.Array) -> list[jax.Array]:
     """How the end turns, seen from the start, with changes of the data and of the path."""
     data = split(numbers)
     known = _solution(problem, data, points)
@@ -174,25 +174,25 @@ def _push(problem: Problem, numbers: jax.Array, points: jax.Array, *changes: jax
     by_data = split(next(given)) if places else []
     by_points = next(given) if problem.moved else jnp.zeros_like(points)
     _, change = jax.jvp(momentum, ([data[i] for i in places], points), (by_data, by_points))
-    change_of_omega = keep(_at_nodes(solve(known.inertia, scale(-1, change)), like))
-    in_step = keep(mean_over_step(known.step.inside(change_of_omega)))
+    change_of_omega = materialize(_at_nodes(solve(known.inertia, scale(-1, change)), like))
+    in_step = materialize(mean_over_step(known.step.inside(change_of_omega)))
     x, y, z = (c.sum() for c in rotate(known.to_step, in_step))
     return [jnp.stack([x, y, z])]
 
 
-def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.Array) -> list[jax.Array]:
+def _pull(problem: RotationProblem, numbers: jax.Array, points: jax.Array, by_turn: jax.Array) -> list[jax.Array]:
     """Transpose of `_push`: what the scalar product of `by_turn` with the end's turn changes by."""
     data = split(numbers)
     robot = problem.robot(data)
     known = _solution(problem, data, points)
     like = known.theta[0]
-    in_step = keep(rotate(conjugate(known.to_step), tuple(split(by_turn))))
+    in_step = materialize(rotate(conjugate(known.to_step), tuple(split(by_turn))))
     by_omega = known.step.back(in_step)
-    mu = keep(_at_nodes(solve(known.inertia, scale(-1, by_omega)), like))
+    mu = materialize(_at_nodes(solve(known.inertia, scale(-1, by_omega)), like))
     of = slopes(robot, known.sine_cosine, known.rate, known.omega, known.velocity, known.centre, mu)
     found = []
     if any(problem.varied):
-        by_entry, loops = jax.tree.leaves(of.robot), jax.tree.leaves(together(robot))
+        by_entry, loops = jax.tree.leaves(of.robot), jax.tree.leaves(fusion_groups(robot))
         unknown = [i for i, varied in enumerate(problem.varied) if varied and problem.known[i] is None]
         sums: dict[int, jax.Array] = {}
         for loop in dict.fromkeys(loops[i] for i in unknown):
@@ -202,7 +202,7 @@ def _pull(problem: Problem, numbers: jax.Array, points: jax.Array, by_turn: jax.
         zero = jnp.zeros((), like.dtype)
         found.append(jnp.stack([sums.get(i, zero) for i, varied in enumerate(problem.varied) if varied]))
     if problem.moved:
-        by_nodes = [keep(_at_nodes(of_joint, like)) for of_joint in zip(of.theta, of.rate, strict=True)]
+        by_nodes = [materialize(_at_nodes(of_joint, like)) for of_joint in zip(of.theta, of.rate, strict=True)]
         by_theta, by_rate = ([pair[i] for pair in by_nodes] for i in (0, 1))
         found.append(to_points(by_theta, by_rate, problem.steps))
     return found

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from reojax.mechanics._fast.materialize import keep
+from reojax.mechanics._fast.materialize import materialize
 
 _x, _w = np.polynomial.legendre.leggauss(8)
 
@@ -36,9 +36,9 @@ def path_nodes(points: jax.Array, steps: int) -> tuple[list[jax.Array], list[jax
     rate = jnp.broadcast_to(rate, start.shape)
     theta, theta_dot = [], []
     for k in range(points.shape[1]):
-        a, b = (x[:, None] for x in keep((start[..., k].reshape(-1), rate[..., k].reshape(-1))))
+        a, b = (x[:, None] for x in materialize((start[..., k].reshape(-1), rate[..., k].reshape(-1))))
         along = a + b * jnp.asarray(NODES[None, :], points.dtype)
-        both = keep((along.reshape(-1), jnp.broadcast_to(b, along.shape).reshape(-1)))
+        both = materialize((along.reshape(-1), jnp.broadcast_to(b, along.shape).reshape(-1)))
         theta.append(both[0])
         theta_dot.append(both[1])
     return theta, theta_dot

@@ -43,7 +43,7 @@ Known = tuple[float | None, ...]
 """Entries of flattened `Parameters` that are known while tracing, `None` for the ones that are data."""
 
 
-class Components(NamedTuple):
+class RobotScalars(NamedTuple):
     """`Parameters` as scalars, link by link and joint by joint."""
 
     mass: Sequence[Scalar]
@@ -121,7 +121,7 @@ def known_parameters(robot: Robot, pattern: Pattern) -> Known:
     )
 
 
-def flattened(arrays: Sequence[jax.Array]) -> jax.Array:
+def flatten(arrays: Sequence[jax.Array]) -> jax.Array:
     """Put the entries of all arrays in a row."""
     return jnp.concatenate([array.reshape(-1) for array in arrays])
 
@@ -132,7 +132,7 @@ def split(numbers: jax.Array) -> list[jax.Array]:
     return [x.reshape(()) for x in jax.lax.split(numbers, (1,) * numbers.size)] if numbers.size else []
 
 
-def components(numbers: Sequence[Scalar], parent: tuple[int, ...]) -> Components:
+def components(numbers: Sequence[Scalar], parent: tuple[int, ...]) -> RobotScalars:
     """Name the entries of flattened `Parameters`."""
     rest = iter(numbers)
 
@@ -141,7 +141,7 @@ def components(numbers: Sequence[Scalar], parent: tuple[int, ...]) -> Components
 
     joints = len(parent)
     links = joints + 1
-    return Components(
+    return RobotScalars(
         mass=[next(rest) for _ in range(links)],
         moment=vectors(links, 3),
         inertia=vectors(links, 6),

@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 
-from reojax.mechanics._fast.materialize import keep
+from reojax.mechanics._fast.materialize import materialize
 from reojax.mechanics._fast.scalar import cross, dot, mul, plus, sub, times as scale
 
 Quaternion = tuple[jax.Array, ...]
@@ -51,7 +51,7 @@ def product(factors: Quaternion) -> Quaternion:
         w, *xyz = factors
         odd = (0, w.shape[0] % 2)
         pairs = [c.reshape(-1, 2) for c in (jnp.pad(w, odd, constant_values=1), *(jnp.pad(c, odd) for c in xyz))]
-        factors = keep(times(*(tuple(c[:, side] for c in pairs) for side in (0, 1))))
+        factors = materialize(times(*(tuple(c[:, side] for c in pairs) for side in (0, 1))))
     return tuple(c[0] for c in factors)
 
 
@@ -62,12 +62,12 @@ def products_up_to(factors: Quaternion) -> Quaternion:
     """
     length = 1
     while length < factors[0].shape[0]:
-        factors = keep(times(shifted(factors, length), factors))
+        factors = materialize(times(shift(factors, length), factors))
         length *= 2
     return factors
 
 
-def shifted(factors: Quaternion, by: int) -> Quaternion:
+def shift(factors: Quaternion, by: int) -> Quaternion:
     """Return the quaternions `by` places later, identities before them, without the last ones."""
     w, *xyz = (c[:-by] for c in factors)
     padding = (by, 0)

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import jax
 
-from reojax.mechanics._fast.materialize import keep
-from reojax.mechanics._fast.parameters import Components
+from reojax.mechanics._fast.materialize import materialize
+from reojax.mechanics._fast.parameters import RobotScalars
 from reojax.mechanics._fast.scalar import (
     ZERO,
     Matrix,
@@ -54,14 +54,14 @@ class Base(NamedTuple):
     """Velocity of the centre of mass while the base rests."""
 
 
-def omega(robot: Components, theta: Sequence[jax.Array], rate: Sequence[jax.Array]) -> Vector:
+def omega(robot: RobotScalars, theta: Sequence[jax.Array], rate: Sequence[jax.Array]) -> Vector:
     """Angular velocity of the base, base frame, at joint angles `theta` and `rate`, arrays of one shape."""
     base = inward(robot, [sincos(angle) for angle in theta], rate)
     return solve(base.inertia, times(-1, base.momentum))
 
 
 def inward(
-    robot: Components, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate: Sequence[Scalar], *, by_joint: bool = False
+    robot: RobotScalars, sine_cosine: Sequence[tuple[Scalar, Scalar]], rate: Sequence[Scalar], *, by_joint: bool = False
 ) -> Base:
     """Gather inertia and momentum from the tips to the base.
 
@@ -87,8 +87,13 @@ def inward(
         f[parent] = plus(f[parent], plus(moment, times(m[link], a)))
         m[parent] = add(m[parent], m[link])
         if k and k % every == 0:
-            moving = keep((*p[parent], *h[parent]))
-            p[parent], h[parent], J[parent], f[parent] = moving[:3], moving[3:], keep(J[parent]), keep(f[parent])
+            moving = materialize((*p[parent], *h[parent]))
+            p[parent], h[parent], J[parent], f[parent] = (
+                moving[:3],
+                moving[3:],
+                materialize(J[parent]),
+                materialize(f[parent]),
+            )
     centre, drift = times(1 / m[0], f[0]), times(1 / m[0], p[0])
     return Base(
         inertia=plus(J[0], times(-1, point_inertia(m[0], centre))),

@@ -1,0 +1,110 @@
+"""Changed copies of a robot: the thesis's three design parameters (figures 2.8 and 2.9)."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike
+
+from reojax._internal.arrays import is_concrete
+from reojax.robot import Robot
+
+
+def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
+    """Return the prototype with another inertia of its end links about their distal joints (thesis figure 2.8).
+
+    The mass of each end link is moved straight towards or away from its joint axis, all of it by the same factor
+    `sqrt(inertia / present inertia)`: a foot of another length with the same steel insert. Mass and heights along
+    the axis stay, and the result is a possible rigid body at any positive inertia. The identity at the present one.
+
+    Args:
+        robot: the prototype, or a changed copy of it.
+        inertia: inertia of either end link about its distal joint's axis [kg m^2]; may be traced.
+
+    Raises:
+        ValueError: if the robot has not four links, or `inertia` is not one positive, finite number.
+    """
+    if robot.links != 4:
+        raise ValueError(f"{robot.name!r} has {robot.links} links; end links are defined for the four-link robot.")
+    xp, cast = _like(robot, inertia)
+    wanted = cast(inertia)
+    if wanted.shape or (is_concrete(wanted) and not 0 < wanted < np.inf):
+        raise ValueError(f"`inertia` is {wanted}; it must be one positive, finite number, in kg m^2.")
+    mass, com, moment, axes, anchor = map(
+        _like(robot)[1], (robot.mass, robot.com, robot.inertia, robot.axis, robot.anchor)
+    )
+
+    def stretch(link: int, axis: Any, point: Any) -> tuple[Any, Any]:
+        """Centre of mass and inertia: polynomials in the factor by which the mass moves."""
+        along = axis[:, None] * axis[None, :]
+        across = np.eye(3, dtype=com.dtype) - along
+        lever = com[link] - point
+        still, moving = point + along @ lever, across @ lever
+        factor = xp.sqrt(wanted / cast((along * moment[link]).sum() + mass[link] * (moving @ moving)))
+
+        def inertia(left: Any, right: Any) -> Any:
+            """Share of `left @ spread @ right` in the inertia, `spread` being the second moments of the mass."""
+            part = left @ (moment[link].trace() / 2 * np.eye(3, dtype=com.dtype) - moment[link]) @ right
+            return cast(part.trace() * np.eye(3, dtype=com.dtype) - part)
+
+        mixed = inertia(along, across) + inertia(across, along)
+        return (
+            cast(still) + factor * cast(moving),
+            inertia(along, along) + factor * (mixed + factor * inertia(across, across)),
+        )
+
+    with jax.default_matmul_precision("highest"):  # or a GPU takes 10 bits of float32
+        first, last = stretch(0, axes[0], anchor[0]), stretch(3, axes[2], np.zeros(3, com.dtype))
+    return robot.replace(
+        com=xp.stack([first[0], *cast(com[1:3]), last[0]]),
+        inertia=xp.stack([first[1], *cast(moment[1:3]), last[1]]),
+    )
+
+
+def with_gear_ratio(robot: Robot, ratio: ArrayLike) -> Robot:
+    """Return a copy of any robot with another gear ratio (thesis figure 2.9).
+
+    Args:
+        robot: the robot.
+        ratio: rotor turns per joint turn, one for all joints or (j,); may be traced.
+
+    Raises:
+        ValueError: if `ratio` has another shape or is not finite.
+    """
+    return robot.replace(gear_ratio=_per_joint(robot, "ratio", ratio))
+
+
+def with_rotor_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
+    """Return a copy of any robot with another rotor inertia (thesis figure 2.9).
+
+    Only the rotors' spin counts: the links' own inertias stay as they are.
+
+    Args:
+        robot: the robot.
+        inertia: inertia of a rotor about its spin axis [kg m^2], one for all joints or (j,); may be traced.
+
+    Raises:
+        ValueError: if `inertia` has another shape, is negative or not finite.
+    """
+    return robot.replace(rotor_inertia=_per_joint(robot, "inertia", inertia, least=0.0))
+
+
+def _per_joint(robot: Robot, entry: str, value: ArrayLike, least: float = -np.inf) -> Any:
+    xp, cast = _like(robot, value)
+    array = cast(value)
+    if array.shape not in ((), (robot.joints,)):
+        raise ValueError(f"`{entry}` has shape {array.shape}; it must be one number or ({robot.joints},).")
+    if is_concrete(array) and not (np.isfinite(array) & (array >= least)).all():
+        rule = "finite" if least == -np.inf else "finite and not negative"
+        raise ValueError(f"`{entry}` is {array}; it must be {rule}.")
+    return xp.broadcast_to(array, (robot.joints,))
+
+
+def _like(robot: Robot, *values: Any) -> tuple[Any, Any]:
+    """Array module and cast for an edit: NumPy unless JAX arrays are about, and the lowest float around."""
+    leaves = [leaf for leaf in (*jax.tree.leaves(robot), *values) if hasattr(leaf, "dtype")]
+    xp = jnp if any(isinstance(leaf, jax.Array) for leaf in leaves) else np
+    floats = [leaf.dtype for leaf in leaves if jnp.issubdtype(leaf.dtype, jnp.floating)]
+    dtype = min(floats, key=lambda d: d.itemsize)
+    return xp, lambda array: xp.asarray(array, dtype)
