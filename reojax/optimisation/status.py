@@ -31,7 +31,7 @@ class Status(IntEnum):
 _TEXTS = {
     Status.CONVERGED: "converged",
     Status.OUT_OF_STEPS: "out of steps: it was still getting better; allow more",
-    Status.STALLED: "stalled: no step makes it better, though the tolerances are not met (rounding, a kink or a plateau)",
+    Status.STALLED: "stalled: no step improves it, though the tolerances are not met (rounding, a kink, a plateau)",
     Status.NOT_FINITE: "not finite: a function or a derivative is NaN or infinite at the start",
     Status.INFEASIBLE: "infeasible: near here the constraints cannot all be met; this is where they are violated least",
     Status.NOT_FOUND: "not found: the search ended without an answer within the tolerance, which proves nothing",

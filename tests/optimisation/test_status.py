@@ -9,7 +9,7 @@ from reojax.optimisation.status import Status, describe
 def test_every_status_has_words_of_its_own():
     texts = [status.text for status in Status]
     assert len(set(texts)) == len(Status)
-    assert all(text.partition(":")[0] == status.name.lower().replace("_", " ") for text, status in zip(texts, Status))
+    assert all(s.text.partition(":")[0] == s.name.lower().replace("_", " ") for s in Status)
 
 
 def test_one_or_many():
