@@ -6,35 +6,10 @@ from typing import Any
 import numpy as np
 
 from reojax._internal.capsule_checks import check_capsules, check_pairs, default_pairs
+from reojax._internal.checks import numbers, refuse
 
 _TOLERANCE = 1e-6
 """Relative rounding allowed in unit lengths, symmetry and the triangle rule (float32 data pass)."""
-
-
-def numbers(entry: str, value: Any, shape: tuple[int, ...], *, finite: bool = True) -> np.ndarray:
-    """Return `value` as a float64 array of `shape` (-1: any length); no NaN, and no infinity if `finite`."""
-    text = str(shape).replace("-1", "n")
-    try:
-        given = np.asarray(value)
-        if given.dtype.kind not in "iuf":  # digits in strings, truth values and complex numbers would convert
-            raise TypeError(f"dtype {given.dtype}")
-        array = given.astype(np.float64)
-    except (TypeError, ValueError) as error:
-        message = f"`{entry}` must be an array of real numbers of shape {text}; got {value!r}."
-        raise ValueError(message) from error
-    if array.ndim != len(shape) or any(n not in (-1, m) for n, m in zip(shape, array.shape, strict=True)):
-        raise ValueError(f"`{entry}` has shape {array.shape}; it must be {text}.")
-    bad = ~np.isfinite(array) if finite else np.isnan(array)
-    refuse(entry, array, bad, "it must be a finite number" if finite else "it must be a number")
-    return array
-
-
-def refuse(entry: str, array: np.ndarray, bad: np.ndarray, rule: str, unit: str = "") -> None:
-    """Raise a `ValueError` for the first True of `bad`, with the entry's index, value and rule."""
-    if bad.any():
-        index = tuple(int(i) for i in np.argwhere(bad)[0])
-        where = ", ".join(map(str, index))
-        raise ValueError(f"{entry}[{where}] is {array[index].tolist()}{unit}; {rule}.")
 
 
 def _as_list(entry: str, value: Any, default: Sequence[Any], what: str) -> tuple[Any, ...]:

@@ -25,6 +25,7 @@ import numpy as np
 from jaxtyping import Float
 
 from reojax import so3
+from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.captures.capture import Capture
 from reojax.captures.comparison import BLOCK, align_frames, fill_gaps, interpolate
@@ -98,8 +99,7 @@ def calibrate(
     Raises:
         ValueError: if the capture lacks joints or orientation, or does not fit the robot, or for an unknown parameter.
     """
-    if not isinstance(robot, Robot):
-        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
     fitted = resolve(robot, parameters)
     problem = _Problem(robot, capture, fitted, clock)
     noise = _joint_noise(capture) if joint_noise is None else float(joint_noise)

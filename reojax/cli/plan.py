@@ -68,7 +68,7 @@ def read_target(text: str) -> "np.ndarray":
     import numpy as np
 
     from reojax import so3
-    from reojax.planning import checks
+    from reojax._internal import checks
 
     kind, *rest = text.split(None, 1)[:2] or [""]
     words = rest[0] if rest else ""

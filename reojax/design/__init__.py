@@ -15,7 +15,7 @@ from reojax.design.measures import (
     turned_about as turned_about,
     turned_to as turned_to,
     value_of as value_of,
-    weigh as weigh,
+    weighted as weighted,
 )
 from reojax.design.problem import Outcome as Outcome, Problem as Problem
 from reojax.design.smooth import fourier_loops as fourier_loops, spline_loops as spline_loops

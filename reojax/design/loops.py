@@ -15,8 +15,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array
-from reojax._internal.robot_checks import numbers
+from reojax._internal.checks import numbers
 from reojax.design.variables import Variable
 from reojax.manoeuvres import Layout
 from reojax.path import Path
@@ -85,8 +86,7 @@ def polygons(robot: Robot, corners: int, *, start: ArrayLike = 0.0, name: str = 
     Raises:
         ValueError: for too few corners, a start outside of the joint limits, or a joint without limits.
     """
-    if isinstance(corners, bool) or not isinstance(corners, int | np.integer) or corners < 2:
-        raise ValueError(f"`corners` is {corners!r}; a polygon has an integer number of free corners, at least 2.")
+    checks.whole("corners", corners, 2)
     moves = (corners + 1) * robot.joints
     edges = np.eye(moves).reshape(corners + 1, robot.joints, moves)
     return _of_moves(f"polygon of {corners} corners", robot, edges, start, name)

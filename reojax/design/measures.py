@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from reojax import so3
 from reojax._internal.arrays import Array
-from reojax._internal.robot_checks import numbers
+from reojax._internal.checks import numbers
 from reojax.design.loops import Loops
 from reojax.design.problem import Measure, Outcome
 from reojax.path import joint_travel
@@ -122,7 +122,7 @@ def value_of(name: str) -> Measure:
     return lambda outcome: outcome.values[name]
 
 
-def weigh(parts: Mapping[Measure, float]) -> Measure:
+def weighted(parts: Mapping[Measure, float]) -> Measure:
     """Sum of measures, each times its weight."""
 
     def measure(outcome: Outcome) -> Array:

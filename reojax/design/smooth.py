@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.design.loops import Loops, limits_of
 from reojax.design.variables import Variable
@@ -128,5 +129,4 @@ def _sample(kind: str, robot: Robot, origin: np.ndarray, basis: np.ndarray, boun
 
 
 def _positive(entry: str, value: int, least: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ValueError(f"`{entry}` is {value!r}; it must be an integer of at least {least}.")
+    checks.whole(entry, value, least)

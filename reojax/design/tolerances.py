@@ -11,7 +11,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array
-from reojax._internal.robot_checks import numbers
+from reojax._internal.checks import numbers
 from reojax.robot import Robot
 
 RELATIVE = ("mass", "inertia", "rotor_inertia", "gear_ratio")

@@ -17,6 +17,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax import so3
+from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.design.tolerances import Sources, across, perturb, sources_of
 from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation
@@ -140,8 +141,7 @@ def spread(
     from reojax.sweeps import sweep, zipped
 
     _check_frame(frame)
-    if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 2:
-        raise ValueError(f"`samples` is {samples!r}; it must be an integer of at least 2.")
+    checks.whole("samples", samples, 2)
     sources = sources_of(robot, tolerances)
     nominal = net_rotation(robot, path, steps=steps)
     jacobian = np.asarray(_jacobian(robot, path, sources, steps))  # (3, k)

@@ -11,9 +11,9 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Float
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array, common_float
 from reojax.mechanics._fast.net_rotation import net_rotation as fast_net_rotation, steps_of_path
 from reojax.mechanics._fast.parameters import Pattern, pattern_of
@@ -66,16 +66,14 @@ def rotation_history(robot: Robot, path: Path, *, samples: int) -> Float[Array, 
 
 
 def _check(robot: Robot, path: Path, entry: str, count: int) -> None:
-    if not isinstance(robot, Robot):
-        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
     if not isinstance(path, Path):
         raise ValueError(f"`path` is a {type(path).__name__}; it must be a Path, such as `polygon(waypoints)` makes.")
     if path.joints != robot.joints:
         raise ValueError(
             f"`path` has waypoints of {path.joints} joint angles; {robot.name!r} has {robot.joints} joints."
         )
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-        raise ValueError(f"`{entry}` is {count!r}; it must be a positive integer.")
+    checks.whole(entry, count)
 
 
 @partial(jax.jit, static_argnums=(2, 3))

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
 from reojax.robot import Robot
 from reojax.so3 import hat
@@ -33,8 +34,7 @@ class Kinematics(NamedTuple):
 
 def check_motion(robot: Robot, **motion: Any) -> Any:
     """Return the robot and the motion's vectors as arrays of one dtype, or raise a `ValueError`."""
-    if not isinstance(robot, Robot):
-        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
     for entry, value in motion.items():
         expected = (3,) if entry in ("omega", "momentum") else (robot.joints,)
         vector = motion[entry] = as_numbers(entry, value)

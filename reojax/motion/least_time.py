@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array, common_float, is_concrete
 from reojax.mechanics.dynamics import joint_load
 from reojax.motion.motor import Motor, check_motors, demand, per_joint
@@ -74,8 +75,7 @@ def minimum_time(
         ValueError: if anything does not fit the robot, or a supply cannot move its motor at all: it does not
             overcome the friction, so that no time is long enough.
     """
-    if not isinstance(robot, Robot):
-        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
     motors = _able(motors, robot)
     law = check_law(law)
     trajectory = along(path, law, 1.0)
@@ -161,6 +161,5 @@ def _check_fit(robot: Robot, trajectory: Trajectory) -> None:
 
 
 def _count(samples: int) -> int:
-    if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 1:
-        raise ValueError(f"`samples` is {samples!r}; it must be a positive integer.")
+    checks.whole("samples", samples)
     return int(samples)

@@ -24,6 +24,7 @@ from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
 from reojax import so3
+from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
 from reojax._internal.linalg import solve_positive
 from reojax.mechanics.dynamics import joint_inertia, joint_load
@@ -151,8 +152,7 @@ def track(
 
 
 def _check(robot: Robot, trajectory: Trajectory, **numbers: float | None) -> None:
-    if not isinstance(robot, Robot):
-        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
     if not isinstance(trajectory, Trajectory):
         raise ValueError(f"`trajectory` is a {type(trajectory).__name__}; it must be a Trajectory, as `along` makes.")
     if trajectory.joints != robot.joints:

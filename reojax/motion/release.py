@@ -21,6 +21,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax import so3
+from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
 from reojax._internal.linalg import solve_symmetric3
 from reojax.mechanics.kinematics import kinematics
@@ -119,8 +120,7 @@ def release_spread(
     Raises:
         ValueError: if anything does not fit the robot, is not finite, or a deviation is negative.
     """
-    if isinstance(draws, bool) or not isinstance(draws, int | np.integer) or draws < 1:
-        raise ValueError(f"`draws` is {draws!r}; it must be a positive integer.")
+    checks.whole("draws", draws)
     robot, trajectory, mean = _check_release(robot, trajectory, Release() if expected is None else expected, steps)
     *_, spread = _check_release(robot, trajectory, deviation, steps)
     if is_concrete(spread) and (np.asarray(spread) < 0).any():
@@ -132,16 +132,14 @@ def _check_release(
     robot: Robot, trajectory: Trajectory, release: Release, steps: int
 ) -> tuple[Robot, Trajectory, Array]:
     """Everything as arrays of one dtype, the release as one vector of ten."""
-    if not isinstance(robot, Robot):
-        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
     if not isinstance(trajectory, Trajectory):
         raise ValueError(f"`trajectory` is a {type(trajectory).__name__}; it must be a Trajectory, as `along` makes.")
     if trajectory.joints != robot.joints:
         raise ValueError(f"`trajectory` moves {trajectory.joints} joints; {robot.name!r} has {robot.joints}.")
     if not isinstance(release, Release):
         raise ValueError(f"`release` is a {type(release).__name__}; it must be a Release.")
-    if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:
-        raise ValueError(f"`steps` is {steps!r}; it must be a positive integer.")
+    checks.whole("steps", steps)
     numbers = {field: as_numbers(f"release.{field}", value) for field, value in release._asdict().items()}
     for field, value in numbers.items():
         shape = () if field == "drag" else (3,)

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
 from reojax._internal.linalg import solve_symmetric3
 from reojax.mechanics.dynamics import Load, base_velocity, joint_load
@@ -94,15 +95,13 @@ def simulate(
     start = as_numbers("momentum", np.zeros(3) if momentum is None else momentum)
     if start.shape != (3,) or (is_concrete(start) and not np.isfinite(start).all()):
         raise ValueError(f"`momentum` is {momentum}; it must be 3 finite numbers.")
-    if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 1:
-        raise ValueError(f"`samples` is {samples!r}; it must be a positive integer.")
+    checks.whole("samples", samples)
     motors = None if motors is None else check_motors(motors, robot)
     return _simulate(robot, trajectory, start, motors, int(samples))
 
 
 def _trajectory(robot: Robot, path: Path | Trajectory, law: Law | str, durations: ArrayLike | None) -> Trajectory:
-    if not isinstance(robot, Robot):
-        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
     if isinstance(path, Trajectory):
         if durations is not None:
             raise ValueError("`durations` go with a path; a trajectory has its own.")

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.optimisation.optimise import Solution, check_starts
 
@@ -44,8 +45,7 @@ def descend(
         ValueError: as `optimise`.
     """
     x, bounds = check_starts(starts, lower, upper, None, data)
-    if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:
-        raise ValueError(f"`steps` is {steps!r}; it must be a positive integer.")
+    checks.whole("steps", steps)
     for entry, number in (("rate", rate), ("slope_tolerance", slope_tolerance)):
         if not np.isfinite(number) or number <= 0:
             raise ValueError(f"`{entry}` is {number!r}; it must be a positive number.")

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 from tqdm import tqdm
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float
 from reojax.optimisation.sqp import (
     CONVERGED,
@@ -97,8 +98,7 @@ def optimise(
     for entry, number in (("tolerance", tolerance), ("slope_tolerance", slope_tolerance)):
         if not np.isfinite(number) or number <= 0:
             raise ValueError(f"`{entry}` is {number!r}; it must be a positive number.")
-    if isinstance(max_steps, bool) or not isinstance(max_steps, int | np.integer) or max_steps < 1:
-        raise ValueError(f"`max_steps` is {max_steps!r}; it must be a positive integer.")
+    checks.whole("max_steps", max_steps)
     functions = _Functions(cost, equality, inequality, data is not None)
     data = jax.tree.map(jnp.asarray, data)
     _check_functions(functions, x, data)

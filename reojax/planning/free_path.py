@@ -15,10 +15,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.manoeuvres import Layout
 from reojax.optimisation.optimise import optimise
-from reojax.planning import checks, quaternions
+from reojax.planning import quaternions
+from reojax.planning.checks import robot_and_layout
 from reojax.planning.free_polygons import Polygons, PolygonTable, family_of
 from reojax.planning.words import box_of
 from reojax.robot import Robot
@@ -107,7 +109,7 @@ def free_paths(
     Raises:
         ValueError: naming the entry, if a target is no rotation or an option makes no sense.
     """
-    layout = checks.robot_and_layout(robot, layout)
+    layout = robot_and_layout(robot, layout)
     given = checks.rotations("targets", targets, (-1, 3, 3))
     twist_limit, bend_limit = checks.positive("twist_limit", twist_limit), checks.positive("bend_limit", bend_limit)
     corners, starts = checks.whole("corners", corners, 2), checks.whole("starts", starts)

@@ -9,10 +9,12 @@ import jax
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.manoeuvres import Layout
-from reojax.planning import checks, quaternions
+from reojax.planning import quaternions
 from reojax.planning.candidates import Context, context, join
+from reojax.planning.checks import OBJECTIVES, key_of, robot_and_layout
 from reojax.planning.fewest import cheapest, fewest, rotation_from_folded
 from reojax.planning.result import Plan, first_of, plans
 from reojax.planning.words import VOCABULARIES, box_of
@@ -81,12 +83,12 @@ def plan_many(
 
     Runs on the host in batches; with `progress`, a bar on stderr counts the targets.
     """
-    layout = checks.robot_and_layout(robot, layout)
+    layout = robot_and_layout(robot, layout)
     targets = checks.rotations("targets", targets, (-1, 3, 3))
     twist_limit, bend_limit = checks.positive("twist_limit", twist_limit), checks.positive("bend_limit", bend_limit)
     most = checks.whole("max_manoeuvres", max_manoeuvres)
     tolerance = checks.positive("tolerance", tolerance)
-    search = {"count": fewest, "travel": cheapest}[checks.one_of("objective", objective, checks.OBJECTIVES)]
+    search = {"count": fewest, "travel": cheapest}[checks.one_of("objective", objective, OBJECTIVES)]
     letters = VOCABULARIES[checks.one_of("vocabulary", vocabulary, tuple(VOCABULARIES))]
     here = _scene(robot, layout, letters, twist_limit, bend_limit)
     wanted = quaternions.from_matrices(targets)
@@ -119,7 +121,7 @@ def replan(robot: Robot, target: ArrayLike, measured: ArrayLike, **options: Any)
 
 def _scene(robot: Robot, layout: Layout, letters: str, twist_limit: float, bend_limit: float) -> Context:
     """Compute what plans of one robot within one box share, or find it among the last few."""
-    key = (checks.key_of(robot), layout, letters, twist_limit, bend_limit, jax.dtypes.canonicalize_dtype(float))
+    key = (key_of(robot), layout, letters, twist_limit, bend_limit, jax.dtypes.canonicalize_dtype(float))
     if key not in _scenes:
         _scenes[key] = context(robot, layout, box_of(robot, layout, letters, twist_limit, bend_limit))
         if len(_scenes) > _KEPT:

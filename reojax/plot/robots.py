@@ -15,6 +15,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax._internal.arrays import as_numbers
 from reojax.plot._solids import Faces, joint_faces, link_faces
 from reojax.plot._style import BASE, INK, LINKS
@@ -134,8 +135,7 @@ def faces_at_pose(robot: Robot, theta: ArrayLike, rotation: ArrayLike | None = N
     Raises:
         ValueError: if an argument has the wrong shape or is not finite.
     """
-    if not isinstance(robot, Robot):
-        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
     turned, origin = poses(robot, _vector("theta", theta, robot.joints))
     base = np.eye(3) if rotation is None else np.asarray(as_numbers("rotation", rotation), float)
     if base.shape != (3, 3) or not np.isfinite(base).all() or np.abs(base @ base.T - np.eye(3)).max() > 1e-3:

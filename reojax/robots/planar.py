@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax.robot import Robot, make_robot
 
 _THICKNESS = 1e-2
@@ -23,8 +24,7 @@ def planar(n: int, *, mass: ArrayLike = 1.0, length: ArrayLike = 1.0) -> Robot:
     Raises:
         ValueError: if `n` is not an integer from 2 up, or a mass or length is not positive.
     """
-    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 2:
-        raise ValueError(f"`n` is {n!r}; a planar robot has an integer number of rods, at least 2.")
+    checks.whole("n", n, 2)
     masses, lengths = _per_rod("mass", mass, n), _per_rod("length", length, n)
     along_x = lengths[:, None] * np.array([1.0, 0.0, 0.0])
     across = masses * lengths**2 / 12

@@ -14,6 +14,7 @@ import jax
 import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
+from reojax._internal import checks
 from reojax.sweeps.grid import Designs
 
 BLOCK = {"cpu": 1024}
@@ -59,8 +60,7 @@ def chunking(count: int, chunk_size: int | None, bytes_per_design: int, platform
         block = -(-chunk // -(-chunk // largest))
         chunk = -(-chunk // block) * block
     else:
-        if isinstance(chunk_size, bool) or not isinstance(chunk_size, int | np.integer) or chunk_size < 1:
-            raise ValueError(f"`chunk_size` is {chunk_size!r}; it must be a positive integer.")
+        checks.whole("chunk_size", chunk_size)
         chunk = min(int(chunk_size), count)
         block = -(-chunk // -(-chunk // largest))
     return Chunking(count, chunk, block, -(-chunk // block))

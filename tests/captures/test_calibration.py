@@ -80,7 +80,7 @@ def test_the_derivatives_are_those_of_the_residuals(synthetic, exact):
     fitted = resolve(robot, PAIR)
     problem = _Problem(robot, capture, fitted, True)
     x = np.array([synthetic.END_INERTIA, synthetic.ROTOR_INERTIA])
-    state = problem.settled(x)
+    state = problem.fit_window(x)
     for k in range(2):
         step = np.zeros(2)
         step[k] = 1e-4 * problem.scale[k]

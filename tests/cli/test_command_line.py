@@ -99,7 +99,7 @@ def test_help(capsys, arguments):
             ["simulate", "--robot", "cat"],
             "reojax simulate: there is no robot named 'cat'; the names",
         ),
-        (["simulate", "--robot", "planar3"], "reojax simulate: 'planar3' has 2 joints; the manoeuvres are"),
+        (["simulate", "--robot", "planar3"], "reojax simulate: 'planar3' has no layout of its own"),
         (
             ["simulate", "--out", "/nowhere/a.png"],
             "reojax simulate: cannot write '/nowhere/a.png': ",

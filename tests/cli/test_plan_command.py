@@ -88,7 +88,7 @@ def test_a_bad_target_is_one_line_and_status_2(capsys, monkeypatch, tmp_path, ta
         ("--max-manoeuvres", "0", "`max_manoeuvres` is 0; it must be a positive integer"),
         ("--out", "a.bmp", "cannot write 'a.bmp'"),
         ("--csv", "a.txt", "cannot write 'a.txt'"),
-        ("--robot", "planar3", "'planar3' has 2 joints"),
+        ("--robot", "planar3", "'planar3' has no layout of its own"),
     ],
 )
 def test_bad_options(capsys, option, value, message):

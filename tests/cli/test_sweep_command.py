@@ -119,7 +119,7 @@ def test_progress_shows_rate_and_time_left(capsys):
         (["twist=1,2", "--outputs", "roll,yaw"], "reojax sweep: argument --outputs: there is no result 'yaw'"),
         (["twist=1,2", "--outputs", "roll,roll"], "reojax sweep: argument --outputs: result 'roll' is given twice"),
         (["twist=1,2", "--robot", "cat"], "reojax sweep: there is no robot named 'cat'"),
-        (["twist=1,2", "--robot", "planar3"], "reojax sweep: 'planar3' has 2 joints"),
+        (["twist=1,2", "--robot", "planar3"], "reojax sweep: 'planar3' has no layout of its own"),
         (["gear=1,2", "end_inertia=5", "--robot", "six_body"], "reojax sweep: 'six_body' has 6 links"),
         (["twist=1,2", "--out", "a.png"], "reojax sweep: cannot write 'a.png': the name of a NumPy archive"),
         (["twist=1,2", "--out", "/nowhere/a.npz"], "reojax sweep: cannot write '/nowhere/a.npz'"),

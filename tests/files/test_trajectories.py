@@ -121,7 +121,7 @@ def test_the_command_line_writes_what_it_says(capsys, monkeypatch, tmp_path):
         (["a.yaml", "--duration", "1", "--rate", "0"], "reojax export: argument --rate: '0' must be positive"),
         (["a.yaml", "--duration", "1e9"], "reojax export: 4e+09 s at 200 Hz are 800000000000 points"),
         (["a.bag", "--duration", "1"], "reojax export: cannot write 'a.bag': the name of a trajectory"),
-        (["a.csv", "--duration", "1", "--robot", "planar2"], "reojax export: 'planar2' has 1 joints"),
+        (["a.csv", "--duration", "1", "--robot", "planar2"], "reojax export: 'planar2' has no layout of its own"),
     ],
 )
 def test_bad_arguments_are_one_line_and_status_2(capsys, monkeypatch, tmp_path, arguments, message):

@@ -50,7 +50,7 @@ def derivatives(robot, waypoints):
     of a half turn, differences take the one near the value.
     """
     numbers, build = ravel_pytree((robot, waypoints))
-    largest = jax.tree.map(lambda leaf: np.full(leaf.shape, np.abs(leaf).max() or 1.0), (robot, waypoints))
+    largest = jax.tree.map(lambda leaf: np.full(leaf.shape, np.abs(leaf).max(initial=0.0) or 1.0), (robot, waypoints))
     units = np.diag(ravel_pytree(largest)[0])
     still = build(np.zeros(len(numbers)))
     value = np.asarray(push(robot, waypoints, *still)[0])

@@ -164,7 +164,7 @@ def test_simulate_by_time_on_the_command_line(monkeypatch, capsys):
         (["time", "--supply", "twelve"], "reojax time: argument --supply: 'twelve' is not a number"),
         (["time", "--law", "jump"], "reojax time: there is no time law named 'jump'"),
         (["time", "--twist", "0", "--bend", "0"], "reojax time: nothing moves"),
-        (["time", "--robot", "planar3"], "reojax time: 'planar3' has 2 joints"),
+        (["time", "--robot", "planar3"], "reojax time: 'planar3' has no layout of its own"),
         (["time", "--out", "a.txt"], "reojax time: cannot write 'a.txt'"),
         (["simulate", "--law", "quintic"], "reojax simulate: argument --law: a time law needs a --duration"),
         (["simulate", "--duration", "0"], "reojax simulate: argument --duration: '0' is not a duration"),

@@ -109,7 +109,7 @@ def test_out_of_reach_is_the_closest_plan():
 
 def test_a_planar_robot_turns_in_its_plane_only():
     """Elsewhere the closest plan is to do nothing."""
-    robot = robots.planar(4)
+    robot = robots.planar(4).replace(layout=reojax.FOUR_BODY)
     out_of_plane = Rotation.from_rotvec([0.5, 0, 0]).as_matrix()
     plan = reojax.plan(robot, out_of_plane, **LIMITS, max_manoeuvres=2)
     assert not plan.converged
@@ -136,7 +136,7 @@ def test_replan_goes_from_what_was_measured():
 @pytest.mark.parametrize("count", [1.0, 7.0])
 def test_derivatives_of_a_word(count):
     """Against differences, powers of loops too."""
-    from reojax.planning import _scene
+    from reojax.planning.plan import _scene
 
     here = _scene(ROBOT, reojax.FOUR_BODY, "AB", *LIMITS.values())
     rng = np.random.default_rng(3)
@@ -169,7 +169,7 @@ def test_derivatives_of_a_word(count):
         ({"objective": "time"}, "`objective` is 'time'; it must be one of 'count', 'travel'"),
         ({"vocabulary": "C"}, "`vocabulary` is 'C'"),
         ({"layout": reojax.SIX_BODY}, "`layout` is for 5 joints; 'prototype' has 3"),
-        ({"robot": robots.planar(2)}, "has 1 joints; the manoeuvres are laid out"),
+        ({"robot": robots.planar(2)}, "has no layout of its own"),
     ],
 )
 def test_bad_input_is_named(change, message):
