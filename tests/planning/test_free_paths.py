@@ -97,11 +97,11 @@ def test_what_cannot_be_reached_ends_closest_and_says_so():
         ({"targets": np.full((1, 3, 3), np.nan)}, r"targets\[0\] has an entry nan"),
         ({"twist_limit": 0.0}, "`twist_limit` is 0.0; it must be one positive number"),
         ({"bend_limit": np.nan}, "`bend_limit` is nan; it must be one positive number"),
-        ({"corners": 1}, "`corners` is 1; it must be an integer, at least 2"),
+        ({"corners": 1}, "`corners` is 1; it must be an integer of at least 2"),
         ({"starts": 0}, "`starts` is 0; it must be a positive integer"),
         ({"max_steps": 2.5}, "`max_steps` is 2.5; it must be a positive integer"),
         ({"tolerance": 0.0}, "`tolerance` is 0.0; it must be one positive number"),
-        ({"seed": -1}, "`seed` is -1; it must be an integer, at least 0"),
+        ({"seed": -1}, "`seed` is -1; it must be an integer of at least 0"),
     ],
 )
 def test_bad_input_is_named(change, message):
