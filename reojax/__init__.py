@@ -1,144 +1,45 @@
-"""reojax: how a robot in free fall turns itself with its own joints, differentiably, in JAX."""
+"""reojax: how a robot in free fall turns itself with its own joints, differentiably, in JAX.
 
-from typing import TYPE_CHECKING, Any
+The public names are listed in `__init__.pyi`, which type checkers read too. Each is imported at its first use (SPEC 1
+of Scientific Python), so that `import reojax`, and with it the command line's help and refusals, does not wait for JAX.
+"""
 
-from reojax import design, robots, so3
-from reojax.capsules import Capsule
-from reojax.captures.calibration import Calibration, calibrate
-from reojax.captures.capture import Capture, make_capture, read_capture
-from reojax.captures.comparison import Comparison, Sampled, compare, joints_simulated
-from reojax.captures.parameters import Parameter
-from reojax.files.trajectories import write_trajectory
-from reojax.manoeuvres import FOUR_BODY, SIX_BODY, Layout, manoeuvre_a, manoeuvre_b
-from reojax.mechanics.certificate import Certificate, certify
-from reojax.mechanics.curvature import curvature
-from reojax.mechanics.dynamics import (
-    base_velocity,
-    forward_dynamics,
-    inverse_dynamics,
-    joint_inertia,
-    kinetic_energy,
-)
-from reojax.mechanics.holonomy import net_rotation, rotation_history
-from reojax.mechanics.momentum import MomentumMatrices, angular_momentum, connection, momentum_matrices
-from reojax.motion.fastest import Fastest, fastest_loop, free_law, overlap
-from reojax.motion.least_time import LeastTime, minimum_stretch, minimum_time
-from reojax.motion.motor import RE_MAX_17, Motor, no_load_speed, stall_torque, with_motors
-from reojax.motion.pid import Gains, Tracking, gains, track
-from reojax.motion.release import Release, Released, ReleaseSpread, release_spread, released
-from reojax.motion.simulation import Motion, simulate
-from reojax.motion.time_laws import Law, minimum_jerk, quintic, trapezoid
-from reojax.motion.trajectory import Trajectory, along, through
-from reojax.path import Path, joint_travel, polygon
-from reojax.planning.free_path import FreePaths, free_path, free_paths
-from reojax.planning.plan import plan, plan_many, replan
-from reojax.planning.result import Plan
-from reojax.robot import Robot, layout_of, make_robot
-from reojax.sweeps.grid import zipped
-from reojax.sweeps.merge import merge
-from reojax.sweeps.result import BadDesign, Sweep
-from reojax.sweeps.sweep import sweep
+import ast
+import importlib
+from pathlib import Path
+from typing import Any
 
-if TYPE_CHECKING:
-    from reojax import plot
 
-__all__ = [
-    "along",
-    "angular_momentum",
-    "BadDesign",
-    "base_velocity",
-    "calibrate",
-    "Calibration",
-    "Capsule",
-    "Capture",
-    "Certificate",
-    "certify",
-    "compare",
-    "Comparison",
-    "connection",
-    "curvature",
-    "design",
-    "Fastest",
-    "fastest_loop",
-    "forward_dynamics",
-    "FOUR_BODY",
-    "free_law",
-    "free_path",
-    "free_paths",
-    "FreePaths",
-    "Gains",
-    "gains",
-    "inverse_dynamics",
-    "joint_inertia",
-    "joint_travel",
-    "joints_simulated",
-    "kinetic_energy",
-    "Law",
-    "Layout",
-    "layout_of",
-    "LeastTime",
-    "make_capture",
-    "make_robot",
-    "manoeuvre_a",
-    "manoeuvre_b",
-    "merge",
-    "minimum_jerk",
-    "minimum_stretch",
-    "minimum_time",
-    "momentum_matrices",
-    "MomentumMatrices",
-    "Motion",
-    "Motor",
-    "net_rotation",
-    "no_load_speed",
-    "overlap",
-    "Parameter",
-    "Path",
-    "Plan",
-    "plan",
-    "plan_many",
-    "plot",
-    "polygon",
-    "quintic",
-    "RE_MAX_17",
-    "read_capture",
-    "Release",
-    "release_spread",
-    "Released",
-    "released",
-    "ReleaseSpread",
-    "replan",
-    "Robot",
-    "robots",
-    "rotation_history",
-    "Sampled",
-    "simulate",
-    "SIX_BODY",
-    "so3",
-    "stall_torque",
-    "Sweep",
-    "sweep",
-    "through",
-    "track",
-    "Tracking",
-    "Trajectory",
-    "trapezoid",
-    "with_motors",
-    "write_trajectory",
-    "zipped",
-]
+def _listed() -> tuple[dict[str, str], list[str]]:
+    """Where each public name comes from, and `__all__`, out of the stub."""
+    home: dict[str, str] = {}
+    names: list[str] = []
+    for node in ast.parse(Path(__file__).with_suffix(".pyi").read_text("utf-8")).body:
+        if isinstance(node, ast.ImportFrom) and node.module:
+            home |= {alias.name: node.module for alias in node.names}
+        elif isinstance(node, ast.Assign):
+            names = ast.literal_eval(node.value)
+    return home, names
 
-_LAZY = ("plot",)
-"""Packages that are imported at their first use: what they need takes long to import."""
+
+_HOME, __all__ = _listed()
 
 
 def __getattr__(name: str) -> Any:
-    if name in _LAZY:
-        import importlib
-
-        return importlib.import_module(f"reojax.{name}")
-    raise AttributeError(f"module 'reojax' has no attribute {name!r}")
+    if name in _HOME and _HOME[name] != __name__:
+        value = getattr(importlib.import_module(_HOME[name]), name)
+    elif name.startswith("_"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    else:  # a package or module, such as `reojax.plot` or `reojax.sweeps`
+        try:
+            value = importlib.import_module(f"{__name__}.{name}")
+        except ModuleNotFoundError as error:
+            if error.name != f"{__name__}.{name}":
+                raise
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}") from None
+    globals()[name] = value
+    return value
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted({*__all__, *globals()})

@@ -72,6 +72,22 @@ def test_no_function_hides_a_package():
 def test_the_public_list_is_complete():
     assert all(hasattr(reojax, name) for name in reojax.__all__)
     assert len(set(reojax.__all__)) == len(reojax.__all__)
+    assert set(reojax._HOME) == set(reojax.__all__) <= set(dir(reojax))
+
+
+def test_unknown_names_are_attribute_errors():
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = reojax.nonsense
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["--version"], ["simulate", "--help"], ["sweep", "twist=x"]])
+def test_help_and_refusals_do_not_wait_for_jax(arguments):
+    code = f"""
+import sys, reojax, reojax.cli
+reojax.cli.main({arguments!r})
+assert not {{"jax", "numpy", "scipy"}} & set(sys.modules)
+"""
+    subprocess.run([sys.executable, "-W", "error", "-c", code], check=True, capture_output=True)
 
 
 @pytest.mark.parametrize("file", [*(ROOT / "experiments").rglob("*.py")], ids=lambda file: file.name)
@@ -97,6 +113,7 @@ def test_import_is_light_and_changes_nothing():
 import sys, jax
 before = dict(jax.config.values)
 import reojax
+assert [getattr(reojax, name) for name in reojax.__all__ if name != "plot"]
 assert dict(jax.config.values) == before
 assert not {"matplotlib", "optax", "scipy.optimize"} & set(sys.modules)
 from jax._src import xla_bridge

@@ -6,6 +6,7 @@ to stdout, after any file has been written. Exit status: 0 done, 1 done but some
 input (one line on stderr), 130 interrupted.
 """
 
+import argparse
 import os
 import sys
 from collections.abc import Sequence
@@ -49,7 +50,7 @@ def _parser() -> Parser:
         description="How a robot in free fall turns itself with its own joints.",
         allow_abbrev=False,
     )
-    parser.add_argument("--version", action="version", version=f"reojax {version()}")
+    parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, module in COMMANDS.items():
         text = (module.__doc__ or "").partition("\n")[0]
@@ -57,3 +58,11 @@ def _parser() -> Parser:
         module.add_arguments(command)
         command.set_defaults(run=module.run)
     return parser
+
+
+class _Version(argparse.Action):
+    """Looks the version up only when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        print(f"reojax {version()}")
+        parser.exit()

@@ -3,7 +3,6 @@
 import argparse
 import math
 from collections.abc import Sequence
-from importlib import metadata
 from typing import NoReturn
 
 LARGEST_ANGLE = 36000.0
@@ -50,6 +49,8 @@ def join_negative_values(arguments: Sequence[str]) -> list[str]:
 
 def version() -> str:
     """Version of the installed package."""
+    from importlib import metadata
+
     try:
         return metadata.version("reojax")
     except metadata.PackageNotFoundError:

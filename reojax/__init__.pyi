@@ -1,0 +1,124 @@
+"""The public names: read by type checkers, and by `__init__.py`, which imports each at its first use."""
+
+from reojax import design, plot, robots, so3
+from reojax.capsules import Capsule
+from reojax.captures.calibration import Calibration, calibrate
+from reojax.captures.capture import Capture, make_capture, read_capture
+from reojax.captures.comparison import Comparison, Sampled, compare, joints_simulated
+from reojax.captures.parameters import Parameter
+from reojax.files.trajectories import write_trajectory
+from reojax.manoeuvres import FOUR_BODY, SIX_BODY, Layout, manoeuvre_a, manoeuvre_b
+from reojax.mechanics.certificate import Certificate, certify
+from reojax.mechanics.curvature import curvature
+from reojax.mechanics.dynamics import (
+    base_velocity,
+    forward_dynamics,
+    inverse_dynamics,
+    joint_inertia,
+    kinetic_energy,
+)
+from reojax.mechanics.holonomy import net_rotation, rotation_history
+from reojax.mechanics.momentum import MomentumMatrices, angular_momentum, connection, momentum_matrices
+from reojax.motion.fastest import Fastest, fastest_loop, free_law, overlap
+from reojax.motion.least_time import LeastTime, minimum_stretch, minimum_time
+from reojax.motion.motor import RE_MAX_17, Motor, no_load_speed, stall_torque, with_motors
+from reojax.motion.pid import Gains, Tracking, gains, track
+from reojax.motion.release import Release, Released, ReleaseSpread, release_spread, released
+from reojax.motion.simulation import Motion, simulate
+from reojax.motion.time_laws import Law, minimum_jerk, quintic, trapezoid
+from reojax.motion.trajectory import Trajectory, along, through
+from reojax.path import Path, joint_travel, polygon
+from reojax.planning.free_path import FreePaths, free_path, free_paths
+from reojax.planning.plan import plan, plan_many, replan
+from reojax.planning.result import Plan
+from reojax.robot import Robot, layout_of, make_robot
+from reojax.sweeps.grid import zipped
+from reojax.sweeps.merge import merge
+from reojax.sweeps.result import BadDesign, Sweep
+from reojax.sweeps.sweep import sweep
+
+__all__ = [
+    "along",
+    "angular_momentum",
+    "BadDesign",
+    "base_velocity",
+    "calibrate",
+    "Calibration",
+    "Capsule",
+    "Capture",
+    "Certificate",
+    "certify",
+    "compare",
+    "Comparison",
+    "connection",
+    "curvature",
+    "design",
+    "Fastest",
+    "fastest_loop",
+    "forward_dynamics",
+    "FOUR_BODY",
+    "free_law",
+    "free_path",
+    "free_paths",
+    "FreePaths",
+    "Gains",
+    "gains",
+    "inverse_dynamics",
+    "joint_inertia",
+    "joint_travel",
+    "joints_simulated",
+    "kinetic_energy",
+    "Law",
+    "Layout",
+    "layout_of",
+    "LeastTime",
+    "make_capture",
+    "make_robot",
+    "manoeuvre_a",
+    "manoeuvre_b",
+    "merge",
+    "minimum_jerk",
+    "minimum_stretch",
+    "minimum_time",
+    "momentum_matrices",
+    "MomentumMatrices",
+    "Motion",
+    "Motor",
+    "net_rotation",
+    "no_load_speed",
+    "overlap",
+    "Parameter",
+    "Path",
+    "Plan",
+    "plan",
+    "plan_many",
+    "plot",
+    "polygon",
+    "quintic",
+    "RE_MAX_17",
+    "read_capture",
+    "Release",
+    "release_spread",
+    "Released",
+    "released",
+    "ReleaseSpread",
+    "replan",
+    "Robot",
+    "robots",
+    "rotation_history",
+    "Sampled",
+    "simulate",
+    "SIX_BODY",
+    "so3",
+    "stall_torque",
+    "Sweep",
+    "sweep",
+    "through",
+    "track",
+    "Tracking",
+    "Trajectory",
+    "trapezoid",
+    "with_motors",
+    "write_trajectory",
+    "zipped",
+]
