@@ -18,6 +18,7 @@ from reojax.mechanics.dynamics import (
     kinetic_energy,
 )
 from reojax.mechanics.holonomy import net_rotation, rotation_history
+from reojax.mechanics.kinematics import LinkPoses, centre_of_mass, link_poses
 from reojax.mechanics.momentum import MomentumMatrices, angular_momentum, connection, momentum_matrices
 from reojax.motion.fastest import Fastest, fastest_loop, free_law, overlap
 from reojax.motion.least_time import LeastTime, minimum_stretch, minimum_time
@@ -46,6 +47,7 @@ __all__ = [
     "Calibration",
     "Capsule",
     "Capture",
+    "centre_of_mass",
     "Certificate",
     "certify",
     "compare",
@@ -72,6 +74,8 @@ __all__ = [
     "Layout",
     "layout_of",
     "LeastTime",
+    "link_poses",
+    "LinkPoses",
     "make_capture",
     "make_robot",
     "manoeuvre_a",

@@ -153,7 +153,7 @@ def edge_momentum(
     fraction = jnp.linspace(0, 1, rotations.shape[0], dtype=rotations.dtype)
     pose = jax.vmap(lambda theta: kinematics(robot, theta))(start[None] + rate[None] * fraction[:, None])
     turn = _product("sab,sibc->siac", rotations, pose.rotation)
-    place = _product("sab,sib->sia", rotations, pose.centre)
+    place = _product("sab,sib->sia", rotations, pose.com)
     axis = _product("sab,skb->ska", rotations, pose.axis)
     spinning = _product("siba,sibc->siac", turn, _derivative(turn))  # hat of the angular velocity, link frame
     omega = 0.5 * jnp.stack([spinning[..., i, k] - spinning[..., k, i] for i, k in ((2, 1), (0, 2), (1, 0))], -1)

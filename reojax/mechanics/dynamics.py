@@ -99,10 +99,12 @@ def joint_load(
     turning = theta_ddot[:, None] * wheel + theta_dot[:, None] * jnp.cross(turn_rate[stator], wheel)
     twisting = twisting.at[stator].add(turning)
     pushing = robot.mass[:, None] * acceleration
-    torque = jnp.einsum("iak,ia->k", pose.turn, twisting) + jnp.einsum("iak,ia->k", pose.shift, pushing)
+    torque = jnp.einsum("iak,ia->k", pose.angular_jacobian, twisting) + jnp.einsum(
+        "iak,ia->k", pose.linear_jacobian, pushing
+    )
     own = robot.rotor_inertia * spin * spin * theta_ddot
     rotor = own + (wheel * turn_acceleration[stator]).sum(1)
-    whole = (twisting + jnp.cross(pose.centre, pushing)).sum(0)
+    whole = (twisting + jnp.cross(pose.com, pushing)).sum(0)
     omega_dot = -solve_symmetric3(A, whole[:, None])[:, 0]
     return Load(torque + rotor - B.T @ omega_dot, rotor + wheel @ omega_dot, omega, omega_dot)
 
@@ -201,9 +203,10 @@ def _stator(robot: Robot) -> np.ndarray:
 def _fixed_base_inertia(robot: Robot, pose: Kinematics) -> Array:
     """`D`: inertia that the joints feel while the base does not turn."""
     spin, stator = rotor_spin(robot), _stator(robot)
-    links = jnp.einsum("iak,iab,ibl->kl", pose.turn, inertia_in_base_frame(robot, pose), pose.turn)
-    links = links + jnp.einsum("i,iak,ial->kl", robot.mass, pose.shift, pose.shift)
-    carried = jnp.einsum("k,ka,kal->kl", robot.rotor_inertia * spin, pose.axis, pose.turn[stator])
+    jacobian = pose.angular_jacobian
+    links = jnp.einsum("iak,iab,ibl->kl", jacobian, inertia_in_base_frame(robot, pose), jacobian)
+    links = links + jnp.einsum("i,iak,ial->kl", robot.mass, pose.linear_jacobian, pose.linear_jacobian)
+    carried = jnp.einsum("k,ka,kal->kl", robot.rotor_inertia * spin, pose.axis, jacobian[stator])
     return links + carried + carried.T + jnp.diag(robot.rotor_inertia * spin * spin)
 
 
@@ -215,7 +218,7 @@ def _accelerations(
     With the angular velocity `omega` of the base constant; the centre of mass of the robot does not accelerate.
     """
     parent, moved = np.array(robot.parent, int), support_mask(robot).astype(omega.dtype)
-    w = omega[None] + pose.turn @ theta_dot
+    w = omega[None] + pose.angular_jacobian @ theta_dot
     w_dot = moved @ (theta_ddot[:, None] * pose.axis + theta_dot[:, None] * jnp.cross(w[parent], pose.axis))
     arm = pose.origin[1:] - pose.origin[parent]
     lever = jnp.einsum("iab,ib->ia", pose.rotation, robot.com)

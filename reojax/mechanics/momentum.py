@@ -60,9 +60,11 @@ def momentum_matrices(robot: Robot, theta: Float[Array, " j"]) -> MomentumMatric
 def momentum_matrices_of_pose(robot: Robot, pose: Kinematics) -> MomentumMatrices:
     """`momentum_matrices` where the poses and Jacobians are known already."""
     inertia = inertia_in_base_frame(robot, pose)
-    lever = jax.vmap(hat)(pose.centre)
+    lever = jax.vmap(hat)(pose.com)
     A = (inertia - jnp.einsum("i,iab,ibc->iac", robot.mass, lever, lever)).sum(0)
-    B = -jnp.einsum("iab,ibk->ak", inertia, pose.turn) - jnp.einsum("i,iab,ibk->ak", robot.mass, lever, pose.shift)
+    B = -jnp.einsum("iab,ibk->ak", inertia, pose.angular_jacobian) - jnp.einsum(
+        "i,iab,ibk->ak", robot.mass, lever, pose.linear_jacobian
+    )
     return MomentumMatrices(A, B - pose.axis.T * (robot.rotor_inertia * rotor_spin(robot))[None])
 
 

@@ -213,7 +213,7 @@ def _nodes(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Arr
         A, B = momentum_matrices(robot, theta)
         columns = jnp.concatenate([(B @ theta_dot)[:, None], jnp.eye(3, dtype=dtype)], axis=1)
         both = solve_symmetric3(A, columns)
-        return _Node(both[:, 0], both[:, 1:], robot.com[0] - kinematics(robot, theta).centre[0])
+        return _Node(both[:, 0], both[:, 1:], robot.com[0] - kinematics(robot, theta).com[0])
 
     nodes = jax.vmap(node)(*(leaf.reshape(within.size, robot.joints) for leaf in (state.theta, state.theta_dot)))
     count = trajectory.pieces * steps

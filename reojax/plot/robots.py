@@ -160,7 +160,7 @@ def _parts(robot: Robot) -> tuple[list[Faces], list[Faces]]:
 def poses(robot: Robot, theta: np.ndarray) -> tuple[Float[np.ndarray, "n 3 3"], Float[np.ndarray, "n 3"]]:
     """Orientation and origin of each link's frame, from the robot's centre of mass, in the base frame.
 
-    As `reojax.mechanics.momentum.kinematics`, which is for JAX to compile; a picture needs a pose at once.
+    As `reojax.link_poses`, which is for JAX to compile; a picture needs a pose at once.
     """
     turned, origin = [np.eye(3)], [np.zeros(3)]
     axis, anchor, com = (np.asarray(x, float) for x in (robot.axis, robot.anchor, robot.com))

@@ -51,7 +51,7 @@ def test_a_wire_turns_the_momentum_by_its_moment():
     wire = FALLING._replace(drag=0.0)
     motion = released(ROBOT, PLAN, wire)
     theta = np.asarray(jax.vmap(PLAN.at)(motion.time).theta)
-    middle = ROBOT.com[0] - np.asarray(jax.vmap(lambda t: kinematics(ROBOT, t).centre[0])(theta))
+    middle = ROBOT.com[0] - np.asarray(jax.vmap(lambda t: kinematics(ROBOT, t).com[0])(theta))
     moment = np.cross(np.einsum("mab,mb->ma", motion.rotation, np.asarray(wire.tied) - middle), wire.pull)
     time = np.asarray(motion.time)
     gained = np.concatenate([[np.zeros(3)], np.cumsum(0.5 * (moment[1:] + moment[:-1]) * np.diff(time)[:, None], 0)])

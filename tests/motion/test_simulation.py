@@ -43,7 +43,7 @@ def measured_momentum(robot, motion, pieces: int) -> tuple[np.ndarray, np.ndarra
         length = motion.time[part][-1] - motion.time[part][0]
         base = motion.rotation[part]
         turn = jnp.einsum("sab,sibc->siac", base, pose.rotation[part])
-        place = jnp.einsum("sab,sib->sia", base, pose.centre[part])
+        place = jnp.einsum("sab,sib->sia", base, pose.com[part])
         axis = jnp.einsum("sab,skb->ska", base, pose.axis[part])
         spinning = jnp.einsum("siba,sibc->siac", turn, _derivative(turn) / length)
         omega = 0.5 * np.stack([spinning[..., i, k] - spinning[..., k, i] for i, k in ((2, 1), (0, 2), (1, 0))], -1)

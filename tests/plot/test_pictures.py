@@ -35,7 +35,7 @@ def test_poses_are_those_of_the_mechanics():
     turned, origin = poses(robot, theta)
     np.testing.assert_allclose(turned, exact.rotation, atol=1e-14)
     centre = origin + np.einsum("nij,nj->ni", turned, robot.com)
-    np.testing.assert_allclose(centre, exact.centre, atol=1e-14)
+    np.testing.assert_allclose(centre, exact.com, atol=1e-14)
     np.testing.assert_allclose(robot.mass @ centre, 0, atol=1e-14)
 
 

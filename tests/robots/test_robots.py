@@ -285,7 +285,7 @@ def test_folded_feet_make_the_prototype():
 
     # mass tensors about the common centre of mass, both in the frame of the first shank
     def spread(robot, pose, turn, links):
-        centre = np.asarray(pose.centre)[links] @ turn
+        centre = np.asarray(pose.com)[links] @ turn
         inertia = turn.T @ np.asarray(pose.rotation)[links] @ robot.inertia[links]
         inertia = inertia @ np.asarray(pose.rotation)[links].transpose(0, 2, 1) @ turn
         lever = np.einsum("ia,ia,bc->ibc", centre, centre, np.eye(3)) - np.einsum("ib,ic->ibc", centre, centre)
