@@ -1,15 +1,19 @@
 """The door of `make_robot`: plain numbers in, checked NumPy arrays out, or a `ValueError`."""
 
+import warnings
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from reojax._internal.capsule_checks import check_capsules, check_pairs, default_pairs
-from reojax._internal.checks import numbers, refuse
+from reojax._internal.checks import index_of, numbers, refuse, shorten
+from reojax._internal.definiteness import check_energy
 
 _TOLERANCE = 1e-6
 """Relative rounding allowed in unit lengths, symmetry and the triangle rule (float32 data pass)."""
+_MANY_TURNS = 8 * np.pi
+"""Limits beyond this are asked about [rad]."""
 
 
 def _as_list(entry: str, value: Any, default: Sequence[Any], what: str) -> tuple[Any, ...]:
@@ -17,7 +21,7 @@ def _as_list(entry: str, value: Any, default: Sequence[Any], what: str) -> tuple
         return tuple(default)
     items = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else None
     if items is None or len(items) != len(default):
-        raise ValueError(f"`{entry}` is {value!r}; it must list {what}.")
+        raise ValueError(f"`{entry}` is {shorten(value)}; it must list {what}.")
     return items
 
 
@@ -25,9 +29,9 @@ def _names(entry: str, value: Any, default: list[str]) -> tuple[str, ...]:
     names = _as_list(entry, value, default, f"{len(default)} names")
     for k, name in enumerate(names):
         if not isinstance(name, str) or not name:
-            raise ValueError(f"{entry}[{k}] is {name!r}; it must be a non-empty string.")
+            raise ValueError(f"{entry}[{k}] is {shorten(name)}; it must be a non-empty string.")
         if name in names[:k]:
-            raise ValueError(f"{entry}[{k}] is {name!r}, which is taken; names must differ.")
+            raise ValueError(f"{entry}[{k}] is {shorten(name)}, which is taken; names must differ.")
     return names
 
 
@@ -36,7 +40,7 @@ def _parents(value: Any, joints: int) -> tuple[int, ...]:
     for k, parent in enumerate(parents):
         if isinstance(parent, bool) or not isinstance(parent, int | np.integer) or not 0 <= parent <= k:
             raise ValueError(
-                f"parent[{k}] is {parent!r}; joint {k} carries link {k + 1}, so its parent must be a link "
+                f"parent[{k}] is {shorten(parent)}; joint {k} carries link {k + 1}, so its parent must be a link "
                 f"that comes before: an integer from 0 to {k}."
             )
     return tuple(int(p) for p in parents)
@@ -47,20 +51,20 @@ def _sides(value: Any, joints: int) -> tuple[str, ...]:
     sides = _as_list("rotor_on", value, ("parent",) * joints, rule)
     for k, side in enumerate(sides):
         if side not in ("parent", "child"):
-            raise ValueError(f"rotor_on[{k}] is {side!r}; it must be 'parent' or 'child'.")
+            raise ValueError(f"rotor_on[{k}] is {shorten(side)}; it must be 'parent' or 'child'.")
     return tuple(str(side) for side in sides)
 
 
-def _inertias(value: Any, links: int) -> np.ndarray:
-    inertia = numbers("inertia", value, (links, 3, 3))
-    for i, matrix in enumerate(inertia):
+def _inertias(value: Any, names: Sequence[str]) -> np.ndarray:
+    inertia = numbers("inertia", value, (len(names), 3, 3))
+    for i, (matrix, name) in enumerate(zip(inertia, names, strict=True)):
         if np.abs(matrix - matrix.T).max() > _TOLERANCE * np.abs(matrix).max():
-            raise ValueError(f"inertia[{i}] is {matrix.tolist()}; it must be symmetric.")
+            raise ValueError(f"inertia[{i}] ({name}) is {matrix.tolist()}; it must be symmetric.")
         small, middle, large = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
-        if small <= 0 or large > (small + middle) * (1 + _TOLERANCE):
+        if small < -_TOLERANCE * large or large < 0 or large > (small + middle) * (1 + _TOLERANCE):
             raise ValueError(
-                f"inertia[{i}] has principal moments {small:.6g}, {middle:.6g}, {large:.6g} kg m^2; a rigid body's "
-                "are positive and none is larger than the sum of the other two."
+                f"inertia[{i}] ({name}) has principal moments {small:.6g}, {middle:.6g}, {large:.6g} kg m^2; of "
+                "a rigid body's none is negative, and none is larger than the sum of the other two."
             )
     return 0.5 * (inertia + inertia.swapaxes(1, 2))
 
@@ -68,19 +72,13 @@ def _inertias(value: Any, links: int) -> np.ndarray:
 def _couplings(value: Any, names: tuple[str, ...]) -> dict[str, Any]:
     """Coupled joints as the fields `couplings`, `coupling_ratio` and `coupling_offset` of `Robot`."""
 
-    def joint(given: Any, entry: str) -> int:
-        if isinstance(given, str) and given in names:
-            return names.index(given)
-        if isinstance(given, bool) or not isinstance(given, int | np.integer) or not 0 <= given < len(names):
-            raise ValueError(f"{entry} is {given!r}; the joints are {', '.join(names)}.")
-        return int(given)
-
     pairs, numbers_ = [], []
     for key, rule in dict(value or {}).items():
         if not isinstance(rule, tuple | list) or len(rule) != 3:
-            raise ValueError(f"couplings[{key!r}] is {rule!r}; it must be (driver, ratio, offset).")
-        pairs.append((joint(key, "a joint of `couplings`"), joint(rule[0], f"couplings[{key!r}][0]")))
-        numbers_.append(numbers(f"couplings[{key!r}][1:]", rule[1:], (2,)))
+            raise ValueError(f"couplings[{key!r:.60}] is {shorten(rule)}; it must be (driver, ratio, offset).")
+        follower = index_of("a key of couplings", key, names, "joint")
+        pairs.append((follower, index_of(f"couplings[{names[follower]!r}][0]", rule[0], names, "joint")))
+        numbers_.append(numbers(f"couplings[{names[follower]!r}][1:]", rule[1:], (2,)))
     followers = {follower for follower, _ in pairs}
     for follower, driver in pairs:
         if driver in followers:
@@ -89,33 +87,53 @@ def _couplings(value: Any, names: tuple[str, ...]) -> dict[str, Any]:
     return {"couplings": tuple(pairs), "coupling_ratio": both[:, 0].copy(), "coupling_offset": both[:, 1].copy()}
 
 
+def _ask_for_degrees(lower: np.ndarray, upper: np.ndarray, names: Sequence[str]) -> None:
+    """Warn of limits of more than four turns: they are legal, and mostly degrees."""
+    for entry, limits in (("lower", lower), ("upper", upper)):
+        for k in np.flatnonzero(np.isfinite(limits) & (np.abs(limits) > _MANY_TURNS)):
+            warnings.warn(
+                f"{entry}[{k}] ({names[k]}) is {limits[k]:g} rad, {abs(limits[k]) / (2 * np.pi):.1f} turns: "
+                "are these degrees? Limits are in rad.",
+                stacklevel=4,
+            )
+            return
+
+
 def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str, Any]:
     """Check the arguments of `make_robot`; return the fields of `Robot`, defaults filled in."""
     mass = numbers("mass", mass, (-1,))
-    refuse("mass", mass, mass <= 0, "a link's mass must be positive", " kg")
     links, joints = len(mass), len(mass) - 1
     if not links:
         raise ValueError("`mass` is empty; a robot has at least one link.")
-    axis = numbers("axis", axis, (joints, 3))
+    axis = numbers("axis", axis, (joints, 3))  # the first entry to disagree with the number of masses
+    link_names = _names("link_names", entries["link_names"], [f"link{i}" for i in range(links)])
+    joint_names = _names("joint_names", entries["joint_names"], [f"joint{k}" for k in range(joints)])
+    refuse("mass", mass, mass < 0, "a link's mass must not be negative", " kg", link_names)
+    if not mass.any():
+        raise ValueError("`mass` is 0 kg for every link; a robot has some mass.")
     length = np.linalg.norm(axis, axis=1)
     for k in np.flatnonzero(np.abs(length - 1) > _TOLERANCE):
-        raise ValueError(f"axis[{k}] is {axis[k].tolist()}, of length {length[k]:.9g}; it must have unit length.")
+        raise ValueError(
+            f"axis[{k}] ({joint_names[k]}) is {axis[k].tolist()}, of length {length[k]:.9g}; it must have unit length."
+        )
 
     def per_joint(entry: str, default: float, **kind: Any) -> np.ndarray:
         value = entries[entry]
         return numbers(entry, np.full(joints, default) if value is None else value, (joints,), **kind)
 
     rotor_inertia = per_joint("rotor_inertia", 0.0)
-    refuse("rotor_inertia", rotor_inertia, rotor_inertia < 0, "it must not be negative", " kg m^2")
+    negative = rotor_inertia < 0
+    refuse("rotor_inertia", rotor_inertia, negative, "it must not be negative", " kg m^2", joint_names)
     lower = per_joint("lower", -np.inf, finite=False)
     upper = per_joint("upper", np.inf, finite=False)
-    refuse("lower", lower, lower >= upper, "it must be below `upper`", " rad")
+    refuse("lower", lower, lower >= upper, "it must be below `upper`", " rad", joint_names)
+    _ask_for_degrees(lower, upper, joint_names)
     if not isinstance(name, str):
-        raise ValueError(f"`name` is {name!r}; it must be a string.")
+        raise ValueError(f"`name` is {shorten(name)}; it must be a string.")
     fields = {
         "mass": mass,
         "com": numbers("com", entries["com"], (links, 3)),
-        "inertia": _inertias(entries["inertia"], links),
+        "inertia": _inertias(entries["inertia"], link_names),
         "axis": axis / length[:, None],
         "anchor": numbers("anchor", entries["anchor"], (joints, 3)),
         "parent": _parents(entries["parent"], joints),
@@ -124,13 +142,13 @@ def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str,
         "rotor_on": _sides(entries["rotor_on"], joints),
         "lower": lower,
         "upper": upper,
-        "link_names": _names("link_names", entries["link_names"], [f"link{i}" for i in range(links)]),
-        "joint_names": _names("joint_names", entries["joint_names"], [f"joint{k}" for k in range(joints)]),
+        "link_names": link_names,
+        "joint_names": joint_names,
         "name": name,
     }
     fields |= _couplings(entries["couplings"], fields["joint_names"])
     fields |= check_capsules(entries["capsules"], fields["link_names"])
-    fields["notes"] = tuple(map(str, entries["notes"]))
+    fields["notes"] = (*map(str, entries["notes"]), *check_energy(fields))
     if entries["collision_pairs"] is None:
         fields["collision_pairs"], touching = default_pairs(fields)
         fields["notes"] += tuple(

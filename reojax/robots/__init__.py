@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from reojax.robot import Robot
+from reojax.robots.astronaut import astronaut as astronaut
 from reojax.robots.edits import (
     with_end_inertia as with_end_inertia,
     with_gear_ratio as with_gear_ratio,
@@ -10,6 +11,8 @@ from reojax.robots.edits import (
 )
 from reojax.robots.planar import planar as planar
 from reojax.robots.prototype import prototype as prototype
+from reojax.robots.quadruped import quadruped as quadruped
+from reojax.robots.satellite_arm import satellite_arm as satellite_arm
 from reojax.robots.six_body import six_body as six_body
 from reojax.robots.two_cylinder_cat import two_cylinder_cat as two_cylinder_cat
 
@@ -20,6 +23,9 @@ _BUILDERS: dict[str, Callable[[], Robot]] = {
     "planar3": lambda: planar(3),
     "planar4": lambda: planar(4),
     "two_cylinder_cat": lambda: two_cylinder_cat(0.25),  # about half a turn at a bend of 60 degrees
+    "satellite_arm": satellite_arm,
+    "quadruped": quadruped,
+    "astronaut": astronaut,
 }
 
 NAMES = tuple(_BUILDERS)

@@ -79,9 +79,9 @@ def test_a_number_that_is_not_finite(entry, bad):
     index = (1,) + (0,) * (len(ARRAYS[entry]) - 1)
     message = refusal(**{entry: changed(entry, index, bad)})
     if (entry, bad) == ("upper", -np.inf):
-        assert message == "lower[1] is -2.0 rad; it must be below `upper`."
+        assert message == "lower[1] (wrist) is -2.0 rad; it must be below `upper`."
     else:
-        assert message.startswith(f"{entry}[{', '.join(map(str, index))}] is {bad}")
+        assert message.replace(" (wrist)", "").startswith(f"{entry}[{', '.join(map(str, index))}] is {bad}")
 
 
 @pytest.mark.parametrize(("entry", "bad"), UNLIMITED)
@@ -134,11 +134,13 @@ def test_no_links_at_all():
     assert "`mass` is empty" in refusal(mass=[])
 
 
-@pytest.mark.parametrize("mass", [0.0, -1.5])
-def test_a_mass_that_is_not_positive(mass):
-    message = refusal(mass=[2.0, mass, 0.5])
-    assert f"mass[1] is {mass} kg" in message
-    assert "positive" in message
+def test_a_negative_mass():
+    message = refusal(mass=[2.0, -1.5, 0.5])
+    assert message == "mass[1] (arm) is -1.5 kg; a link's mass must not be negative."
+
+
+def test_a_robot_without_any_mass():
+    assert "`mass` is 0 kg for every link" in refusal(mass=[0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(
@@ -146,7 +148,7 @@ def test_a_mass_that_is_not_positive(mass):
 )
 def test_an_axis_that_is_not_a_unit_vector(axis, length):
     message = refusal(axis=[[1.0, 0.0, 0.0], axis])
-    assert f"axis[1] is {axis}, of length {length};" in message
+    assert f"axis[1] (wrist) is {axis}, of length {length};" in message
     assert "unit length" in message
 
 
@@ -161,22 +163,69 @@ def test_an_axis_rounded_to_float32_is_made_a_unit_vector():
     ("matrix", "rule", "value"),
     [
         (np.diag([1.0, 1.0, 2.1]), "sum of the other two", "2.1"),
-        (np.diag([1.0, 0.0, 1.0]), "positive", "0, 1, 1"),
-        (np.diag([1.0, -0.5, 1.0]), "positive", "-0.5"),
-        (-np.eye(3), "positive", "-1"),
+        (np.diag([1.0, -0.5, 1.0]), "negative", "-0.5"),
+        (-np.eye(3), "negative", "-1"),
         ([[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], "symmetric", "0.1"),
         (
             [[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-            "positive",
+            "sum of the other two",
             "2",
         ),  # a singular one, not diagonal
     ],
 )
 def test_an_inertia_that_no_rigid_body_has(matrix, rule, value):
     message = refusal(inertia=[GOOD["inertia"][0], matrix, GOOD["inertia"][2]])
-    assert "inertia[1]" in message
+    assert "inertia[1] (arm)" in message
     assert rule in message
     assert value in message
+
+
+@pytest.mark.parametrize("inertia", [np.zeros((3, 3)), np.diag([0.0, 1.0, 1.0]), np.outer([0, 0, 1], [0, 0, 1]) * 0.0])
+@pytest.mark.parametrize("mass", [0.0, 1.0])
+def test_massless_links_point_masses_and_rods_are_legal_where_the_rest_moves_with_them(inertia, mass):
+    """A link in the middle: the hand has inertia against every joint."""
+    robot = make_robot(
+        **GOOD | {"mass": [2.0, mass, 0.5], "inertia": [GOOD["inertia"][0], inertia, GOOD["inertia"][2]]}
+    )
+    A, B = momentum_matrices(robot, np.array([0.3, -0.4]))
+    assert np.isfinite(A).all()
+    assert np.linalg.eigvalsh(np.asarray(A))[0] > 0
+
+
+def test_what_has_no_kinetic_energy_is_named():
+    """A massless last link, a point mass on its own joint's axis, a lone point mass, and a rotor beyond its link."""
+    none = np.zeros((3, 3))
+    last = refusal(mass=[2.0, 1.0, 0.0], inertia=[*GOOD["inertia"][:2], none])
+    assert "not positive for a motion of joint 'wrist'" in last
+    on_axis = {"mass": [2.0, 1.0, 0.5], "inertia": [*GOOD["inertia"][:2], none], "com": [[0.0] * 3] * 3}
+    assert "joint 'wrist'" in refusal(**on_axis)
+    empty = np.zeros((0, 3))
+    with pytest.raises(ValueError, match="the base about x, the base about y, the base about z"):
+        make_robot(mass=[1.0], com=[[0, 0, 0]], inertia=[none], axis=empty, anchor=empty)
+    assert "rotor has more than its link" in refusal(rotor_inertia=[9.0, 0.0], gear_ratio=[1.0, 1.0])
+
+
+def test_a_posture_without_inertia_is_noted():
+    """Thin rods in line have none about the line; bent they do."""
+    rods = {"mass": [1.0] * 3, "com": [[0.5, 0, 0]] * 3, "inertia": [np.diag([0, 1, 1]) / 12] * 3}
+    robot = make_robot(**rods, axis=[[0, 0, 1]] * 2, anchor=[[1, 0, 0]] * 2)
+    assert robot.notes == (
+        "at theta = 0 the kinetic energy is not positive for a motion of the base about x: start elsewhere",
+    )
+
+
+def test_limits_of_many_turns_are_asked_about():
+    with pytest.warns(UserWarning, match=r"lower\[0\] \(shoulder\) is -170 rad, 27.1 turns: are these degrees"):
+        make_robot(**GOOD | {"lower": [-170.0, -2.0]})
+    make_robot(**GOOD | {"lower": [-20.0, -np.inf], "upper": [20.0, np.inf]})
+
+
+@pytest.mark.parametrize("entry", [*GOOD, "capsules", "collision_pairs", "couplings", "notes"])
+def test_a_megabyte_of_input_makes_a_short_message(entry):
+    for huge in ("x" * 1_000_000, ["x" * 1_000_000] * 3, [["x" * 1_000_000]] * 2):
+        if entry == "name" and isinstance(huge, str) or entry in ("link_names", "joint_names", "notes"):
+            continue  # legal, or refused for its length
+        assert len(refusal(**{entry: huge})) < 600
 
 
 def test_a_flat_inertia_is_a_limit_that_is_allowed():
@@ -223,14 +272,14 @@ def test_one_word_where_a_list_of_sides_belongs():
 
 def test_a_negative_rotor_inertia():
     message = refusal(rotor_inertia=[0.0, -1e-7])
-    assert "rotor_inertia[1] is -1e-07 kg m^2" in message
+    assert "rotor_inertia[1] (wrist) is -1e-07 kg m^2" in message
     assert "negative" in message
 
 
 @pytest.mark.parametrize(("lower", "upper"), [([-1.0, 2.0], [1.0, 2.0]), ([-1.0, 2.5], [1.0, 2.0])])
 def test_limits_that_leave_no_room(lower, upper):
     message = refusal(lower=lower, upper=upper)
-    assert f"lower[1] is {lower[1]} rad" in message
+    assert f"lower[1] (wrist) is {lower[1]} rad" in message
     assert "below `upper`" in message
 
 
