@@ -29,7 +29,7 @@ COMMANDS = {
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line with `argv` (default: the process's arguments) and return its exit status."""
     try:
-        args = _parser().parse_args(join_negative_values(sys.argv[1:] if argv is None else argv))
+        args = parse(sys.argv[1:] if argv is None else argv)
         args.run(args)
         sys.stdout.flush()
     except BadInput as error:
@@ -42,6 +42,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of stdout has enough; Python flushes once more when it ends
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0
+
+
+def parse(argv: Sequence[str]) -> argparse.Namespace:
+    """Read arguments; what would be run is `args.run(args)`."""
+    return _parser().parse_args(join_negative_values(argv))
 
 
 def _parser() -> Parser:

@@ -1,10 +1,5 @@
 """Sweeps: every design at its place, whatever the sizes; bad designs told by their values."""
 
-import contextlib
-import io
-import re
-from pathlib import Path
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -194,14 +189,3 @@ def test_too_much_for_memory_is_refused_before_it_is_computed():
 def test_a_sweep_runs_outside_jit():
     with pytest.raises(ValueError, match="axis 'x' is being traced by JAX"):
         jax.jit(lambda x: reojax.sweep(lambda x: x, {"x": x}))(np.ones(2))
-
-
-def test_the_page_prints_what_it_says():
-    """The first Python block of docs/sweeps.md, run, prints the text block that follows."""
-    page = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text()
-    match = re.search(r"```python\n(.*?)```\n\n```text\n(.*?)```", page, re.DOTALL)
-    assert match is not None
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        exec(compile(match[1], "sweeps.md", "exec"), {})
-    assert printed.getvalue() == match[2]
