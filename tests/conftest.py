@@ -1,16 +1,39 @@
-"""A hostile test environment: strict shapes and dtypes, NaN is an error, float64 on; and a quick compiler."""
+"""A hostile test environment: strict shapes and dtypes, NaN is an error, float64 on; and a quick compiler.
 
+`REOJAX_TEST_X64=0` leaves float64 off, JAX's default, for the tests marked `float32`.
+"""
+
+import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import jax
 import pytest
 
 from reojax.session import compile_quickly
 
+X64 = os.environ.get("REOJAX_TEST_X64", "1") != "0"
+
 compile_quickly()
-jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_enable_x64", X64)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_debug_nans", True)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep compiled programs for the next run, and for the other processes of this one."""
+    folder = Path(config.cache.mkdir("jax"))  # pyright: ignore[reportOptionalMemberAccess]
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Without float64 only the tests that are meant for that run."""
+    if not X64:
+        skip = pytest.mark.skip(reason="needs float64")
+        for item in items:
+            if item.get_closest_marker("float32") is None:
+                item.add_marker(skip)
 
 
 @pytest.fixture(autouse=True, scope="module")

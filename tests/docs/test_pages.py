@@ -1,7 +1,8 @@
 """Every code block of the README and of the pages in docs does what it says.
 
 Python blocks of one page are run in order in one namespace, from an empty folder; a `text` block right after one is
-what it prints (`...` stands for anything). Lines of shell blocks that call `reojax` have options that the command line takes.
+what it prints (`...` stands for anything). Lines of shell blocks that call `reojax` have options that the command
+line takes.
 """
 
 import contextlib
