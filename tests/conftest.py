@@ -22,6 +22,8 @@ jax.config.update("jax_debug_nans", True)
 
 def pytest_configure(config: pytest.Config) -> None:
     """Keep compiled programs for the next run, and for the other processes of this one."""
+    if not hasattr(config, "cache"):  # pytest -p no:cacheprovider
+        return
     folder = Path(config.cache.mkdir("jax"))  # pyright: ignore[reportOptionalMemberAccess]
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
