@@ -1,0 +1,66 @@
+"""Clearance at one posture: how far apart the capsules of each pair are."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from reojax._internal.arrays import Array
+from reojax.collision.chains import Geometry, Structure, geometry_of, structure_of
+from reojax.collision.placement import pair_ends
+from reojax.collision.segments import segment_distance
+from reojax.mechanics.kinematics import check_motion
+from reojax.robot import Robot
+
+
+def clearance(robot: Robot, theta: ArrayLike) -> Float[Array, " p"]:
+    """Signed distance between the two capsules of each pair of `robot.collision_pairs` at joint angles `theta` [m].
+
+    The distance between the centre lines less both radii, exact for capsules and spheres; negative where two of them
+    overlap, by as much as the surfaces are past each other. Has derivatives of any order wherever they exist, and 0
+    for the first where two centre lines cross.
+
+    Args:
+        robot: the robot; one without pairs has no distances, (0,).
+        theta: (j,) joint angles [rad].
+
+    Raises:
+        ValueError: if `theta` has the wrong shape or is not finite.
+    """
+    robot, angles = check_motion(robot, theta=theta)
+    return _clearance(geometry_of(robot, angles.dtype), angles[:, None], structure_of(robot))[:, 0]
+
+
+def clearances(robot: Robot, thetas: Float[Array, "s j"]) -> Float[Array, "p s"]:
+    """Clearances of all pairs at many postures, unchecked and in one pass [m]."""
+    points = jnp.asarray(thetas)
+    return _clearance(geometry_of(robot, points.dtype), points.T, structure_of(robot))
+
+
+@partial(jax.jit, static_argnums=2)
+def _clearance(geometry: Geometry, theta: jax.Array, structure: Structure) -> jax.Array:
+    if not structure.pairs:
+        return jnp.zeros((0, theta.shape[1]), theta.dtype)
+    return segment_distance(*pair_ends(structure, geometry, theta)) - radii(structure, geometry)[:, None]
+
+
+def radii(structure: Structure, geometry: Geometry) -> Float[Array, " p"]:
+    """Sum of the two radii of each pair [m]."""
+    return geometry.radius[np.array(structure.pairs, int).reshape(-1, 2)].sum(1)
+
+
+def pair_name(robot: Robot, pair: int) -> str:
+    """Names of the two links of a pair, by its number in `robot.collision_pairs`; capsules where a link has several."""
+
+    def name(capsule: int) -> str:
+        link = robot.capsule_link[capsule]
+        alone = robot.capsule_link.count(link) == 1
+        return robot.link_names[link] if alone else f"{robot.link_names[link]} (capsule {capsule})"
+
+    first, second = robot.collision_pairs[pair]
+    return f"{name(first)} and {name(second)}"
