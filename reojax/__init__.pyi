@@ -6,6 +6,7 @@ from reojax.captures.calibration import Calibration, calibrate
 from reojax.captures.capture import Capture, make_capture, read_capture
 from reojax.captures.comparison import Comparison, Sampled, compare, joints_simulated
 from reojax.captures.parameters import Parameter
+from reojax.collision.clearance import clearance
 from reojax.files.trajectories import write_trajectory
 from reojax.manoeuvres import FOUR_BODY, SIX_BODY, Layout, manoeuvre_a, manoeuvre_b
 from reojax.mechanics.certificate import Certificate, certify
@@ -51,6 +52,7 @@ __all__ = [
     "Certificate",
     "certify",
     "compare",
+    "clearance",
     "Comparison",
     "connection",
     "curvature",

@@ -114,7 +114,7 @@ def levers(structure: Structure, geometry: Geometry) -> Float[jax.Array, "p 2 m"
         ends = [side[capsule] - place for side in (geometry.start, geometry.end)]
         last = following < 0
 
-        def reach(vectors: tuple[jax.Array, jax.Array, jax.Array], last=last, beyond=beyond) -> jax.Array:
+        def reach(vectors: tuple[Array, Array, Array], last=last, beyond=beyond) -> jax.Array:
             first, second, to_next = map(_length, vectors)
             return jnp.where(last, jnp.maximum(first, second), to_next + beyond)
 
@@ -129,7 +129,7 @@ def _place(geometry: Geometry, joint: np.ndarray, link: np.ndarray) -> jax.Array
     return jnp.where((link == joint + 1)[..., None], 0, geometry.anchor[joint])
 
 
-def _length(vectors: jax.Array) -> jax.Array:
+def _length(vectors: Array) -> jax.Array:
     square = (vectors * vectors).sum(-1)
     return jnp.where(square > 0, jnp.sqrt(jnp.where(square > 0, square, 1)), 0)
 

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
+from reojax.capsules import Capsule
 from reojax.robot import Robot, make_robot
 
 _THICKNESS = 1e-2
@@ -14,7 +15,8 @@ def planar(n: int, *, mass: ArrayLike = 1.0, length: ArrayLike = 1.0) -> Robot:
     """Build `n` uniform rods end to end, straight along x at `theta = 0`, every joint about z.
 
     The base turns about z only (call it yaw; x is roll, y pitch). Base frame: origin at the free end of rod 0. Rod i
-    has inertia `mass * length^2 / 12` about y and z, exactly. No motors' rotors, no joint limits. All numbers chosen.
+    has inertia `mass * length^2 / 12` about y and z, exactly. Its capsule has the radius of a thin cylinder with its
+    inertia about x, and ends on the joints. No motors' rotors, no joint limits. All numbers chosen.
 
     Args:
         n: number of rods, at least 2.
@@ -34,6 +36,10 @@ def planar(n: int, *, mass: ArrayLike = 1.0, length: ArrayLike = 1.0) -> Robot:
         inertia=across[:, None, None] * np.diag([_THICKNESS, 1.0, 1.0]),
         axis=[(0, 0, 1)] * (n - 1),
         anchor=along_x[:-1],
+        capsules=[
+            Capsule(i, np.zeros(3), end, length * np.sqrt(_THICKNESS / 6))
+            for i, (end, length) in enumerate(zip(along_x, lengths, strict=True))
+        ],
         name=f"planar{n}",
     )
 

@@ -26,7 +26,8 @@ centre joint. That motor is chosen to sit in link 1; its rotor is all that tells
 the end links. Both end links are the same part, so but for the centre rotor the robot is symmetric under a half turn
 about y. The foot leaves the bending plane (y-z) by `foot_angle`. Ends that mirror each other would make A a pure roll,
 however they are built; this way it has an off-axis part, and the feet pass each other in A. (They meet in some of the
-others: `manoeuvre_b(-270 deg, 120 deg)` is one. Self-collision is not modelled.)
+others: `manoeuvre_b(-270 deg, 120 deg)` is one.) Its capsules contain the parts: of a middle link the whole cylinder,
+rounded over its ends, of an end link shank, foot and the ball about the insert's corners.
 
 **Fitted.** `experiments/fit_prototype.py` finds length and radius of the middle links and the foot angle from three
 aims: A at 270/120 degrees rolls by 185 degrees and tips the roll axis by 2, and the roll peaks at an end link inertia
@@ -39,6 +40,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from reojax.capsules import Capsule
 from reojax.manoeuvres import FOUR_BODY
 from reojax.robot import Robot, make_robot
 from reojax.robots.parts import Solid, cube, cylinder, half_turn_y, join
@@ -132,6 +134,12 @@ def prototype(chosen: Chosen | None = None) -> Robot:
         upper=[TWIST_LIMIT, BEND_LIMIT, TWIST_LIMIT],
         joint_names=["twist1", "bend", "twist2"],
         layout=FOUR_BODY,
+        capsules=[
+            *_end_capsules(0, chosen, 1.0),
+            middle_capsule(1, chosen),
+            middle_capsule(2, chosen),
+            *_end_capsules(3, chosen, -1.0),
+        ],
         name="prototype",
     )
 
@@ -162,3 +170,26 @@ def _end_link(chosen: Chosen) -> Solid:
     """First end link, standing along +z on joint 0 at the origin."""
     top = np.array([0.0, 0.0, chosen.shank_length])
     return join(shank(chosen, start=0.0), foot(chosen, heel=top, along=chosen.foot_direction))
+
+
+def middle_capsule(link: int, chosen: Chosen) -> Capsule:
+    """Shape of a middle link: its cylinder, with a round end at either joint."""
+    return Capsule(link, np.zeros(3), np.array([0.0, 0.0, -chosen.middle_length]), chosen.middle_radius)
+
+
+def foot_capsules(link: int, chosen: Chosen, *, heel: ArrayLike, along: ArrayLike) -> list[Capsule]:
+    """Shape of a foot: its rod, and the ball through the corners of the insert."""
+    heel, along = np.asarray(heel, float), np.asarray(along, float)
+    tip = heel + chosen.foot_length * along
+    return [
+        Capsule(link, heel, tip, chosen.rod_radius),
+        Capsule(link, tip, tip, np.sqrt(0.75) * chosen.insert_side),
+    ]
+
+
+def _end_capsules(link: int, chosen: Chosen, side: float) -> list[Capsule]:
+    """Shape of an end link; `side` -1 turns it by half a turn about y, as the last link."""
+    turn = np.array([side, 1.0, side])
+    heel = turn * (0.0, 0.0, chosen.shank_length)
+    shin = Capsule(link, np.zeros(3), heel, chosen.rod_radius)
+    return [shin, *foot_capsules(link, chosen, heel=heel, along=turn * chosen.foot_direction)]

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from reojax.capsules import Capsule
 from reojax.manoeuvres import SIX_BODY
 from reojax.robot import Robot, make_robot
 from reojax.robots.parts import half_turn_y
@@ -12,6 +13,8 @@ from reojax.robots.prototype import (
     TWIST_LIMIT,
     Chosen,
     foot,
+    foot_capsules,
+    middle_capsule,
     middle_link,
     shank,
 )
@@ -49,6 +52,14 @@ def six_body() -> Robot:
         upper=upper,
         link_names=["foot1", "shank1", "middle1", "middle2", "shank2", "foot2"],
         joint_names=["fold1", "twist1", "bend", "twist2", "fold2"],
+        capsules=[
+            *foot_capsules(0, chosen, heel=(0, 0, 0), along=(0, 0, 1)),
+            Capsule(1, np.zeros(3), down_shank, chosen.rod_radius),
+            middle_capsule(2, chosen),
+            middle_capsule(3, chosen),
+            Capsule(4, np.zeros(3), down_shank, chosen.rod_radius),
+            *foot_capsules(5, chosen, heel=(0, 0, 0), along=(0, 0, -1)),
+        ],
         layout=SIX_BODY,
         name="six_body",
     )

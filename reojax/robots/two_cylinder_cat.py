@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from reojax.capsules import Capsule
 from reojax.robot import Robot, make_robot
 from reojax.robots.parts import Solid, cylinder
 
@@ -26,7 +27,8 @@ def two_cylinder_cat(axial_to_transverse: float) -> Robot:
     the way the base makes a full turn the other way with its own spin, which leaves its net rotation as it is.
 
     Axes as on the prototype: roll about z, yaw about y, pitch about x; joints 0 and 2 spin the halves about -z, joint
-    1 bends about x. Base: front half, frame on joint 0. No joint limits.
+    1 bends about x. Base: front half, frame on joint 0. No joint limits. Each half has two capsules, its part next to
+    the waist and the one beyond it: the two at the waist always touch, the others must stay clear.
 
     *Why it is exact.* A hinge that both bends and rolls needs a waist link between bend and spin, which must have some
     mass. Each half is one uniform cylinder, shared out: the waist link has a tenth of its mass and inertia, and a
@@ -62,5 +64,10 @@ def two_cylinder_cat(axial_to_transverse: float) -> Robot:
         rotor_on=["child", "parent", "parent"],
         link_names=["front", "waist1", "waist2", "rear"],
         joint_names=["spin1", "bend", "spin2"],
+        capsules=[
+            Capsule(link, (0, 0, side * share * length), (0, 0, side * (share + 0.5) * length), _RADIUS)
+            for link, side in ((0, 1), (3, -1))
+            for share in (0.0, 0.5)
+        ],
         name="two_cylinder_cat",
     )
