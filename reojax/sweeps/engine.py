@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from itertools import islice
 from typing import Any
 
@@ -20,15 +21,20 @@ def run(function: Callable[..., Any], program: Program, outputs: Outputs, todo: 
     """Run the chunks `todo`, which is read one round of devices at a time; yield those this process computes."""
     fallback = _Fallback(function, program, outputs)
     numbers, under_way = iter(todo), deque[tuple[Any, list[int | None]]]()
-    while True:
-        chunks: list[int | None] = list(islice(numbers, program.mesh.size))
-        if chunks:
-            chunks += [None] * (program.mesh.size - len(chunks))
-            under_way.append((_start(program, chunks), chunks))
-        if under_way and (not chunks or len(under_way) > IN_FLIGHT):
-            yield from _finish(program, fallback, outputs, *under_way.popleft())
-        elif not chunks:
-            return
+    try:
+        while True:
+            chunks: list[int | None] = list(islice(numbers, program.mesh.size))
+            if chunks:
+                chunks += [None] * (program.mesh.size - len(chunks))
+                under_way.append((_start(program, chunks), chunks))
+            if under_way and (not chunks or len(under_way) > IN_FLIGHT):
+                yield from _finish(program, fallback, outputs, *under_way.popleft())
+            elif not chunks:
+                return
+    finally:  # stopped: the program must not outlive the interpreter
+        for started, _ in under_way:
+            with suppress(Exception):
+                jax.block_until_ready(started)
 
 
 def _start(program: Program, chunks: list[int | None]) -> Any:

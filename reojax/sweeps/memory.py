@@ -21,7 +21,7 @@ class Memory:
         """
         check_memory(sizes.total, bytes_per_design(outputs), advice)
         self._arrays = [np.empty((sizes.total, *output.shape), output.dtype) for output in outputs]
-        self._sizes = sizes
+        self._sizes, self._kept = sizes, set[int]()
         self.failures: dict[int, str] = {}
         """Reasons by number of the design, of designs without a finite result."""
 
@@ -30,10 +30,17 @@ class Memory:
         start, stop = self._sizes.bounds(chunk.number)
         for array, values in zip(self._arrays, chunk.results, strict=True):
             array[start:stop] = values
+        self._kept.add(chunk.number)
         self.failures |= chunk.bad
 
     def arrays(self, designs: Designs) -> list[Any]:
-        """Return the results with the grid's shape in front."""
+        """Return the results with the grid's shape in front.
+
+        Raises:
+            ValueError: if a chunk was never kept, as nothing is known of its designs.
+        """
+        if len(self._kept) < self._sizes.chunks:
+            raise ValueError(f"{self._sizes.chunks - len(self._kept)} chunks of the sweep are not there.")
         return [array.reshape(designs.shape + array.shape[1:]) for array in self._arrays]
 
 

@@ -9,11 +9,15 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from reojax._internal.archives import read_archive
+from reojax._internal.checks import shorten
 from reojax._internal.files import replacing
 from reojax.sweeps.grid import Designs
 
 SCHEMA = "reojax-sweep-1"
 """Name of the layout of saved sweeps."""
+LARGEST = 2**40
+"""Most bytes of a saved sweep; more is no file that was meant."""
 
 
 class BadDesign(NamedTuple):
@@ -144,16 +148,35 @@ class Sweep:
             ValueError: if the file cannot be read, or is not a saved sweep.
         """
         try:
-            with open(path, "rb") as raw, np.load(raw, allow_pickle=False) as file:
-                about = json.loads(str(file["about"]))
-                if about["schema"] != SCHEMA:
-                    raise ValueError(f"its layout is {about['schema']!r}; this reojax reads {SCHEMA!r}")
-                axes = {name: file[f"axes/{name}"] for name in about["axes"]}
-                results = {name: file[f"results/{name}"] for name in about["results"]}
+            arrays = read_archive(path, LARGEST)
+            about = json.loads(str(arrays["about"]))
+            if about["schema"] != SCHEMA:
+                raise ValueError(f"its layout is {shorten(about['schema'])}; this reojax reads {SCHEMA!r}")
+            axes = {name: arrays[f"axes/{name}"] for name in about["axes"]}
+            results = {name: arrays[f"results/{name}"] for name in about["results"]}
+            for name, values in axes.items():
+                if (
+                    values.ndim != 1
+                    or not values.size
+                    or values.dtype.kind not in "iuf"
+                    or not np.isfinite(values).all()
+                ):
+                    raise ValueError(f"axis {name!r} is {values.dtype}{list(values.shape)}, or not finite")
+            designs = Designs(axes, bool(about["zipped"]))
+            rows = {len(values) for values in axes.values()}
+            if list(designs.shape) != about["shape"] or (designs.zipped and len(rows) > 1):
+                raise ValueError(f"its axes make the shape {list(designs.shape)}, and not {shorten(about['shape'])}")
+            for name, values in results.items():
+                if values.shape[: len(designs.shape)] != designs.shape or values.dtype.kind not in "biufc":
+                    raise ValueError(f"result {name!r} is {values.dtype}{list(values.shape)}")
+            failures = {int(number): str(reason) for number, reason in about["bad"].items()}
+            if not all(0 <= number < designs.total for number in failures):
+                raise ValueError("a bad design is none of its designs")
+            units = {str(name): str(unit) for name, unit in about["units"].items()}
         except Exception as error:
-            raise ValueError(f"cannot read {str(path)!r} as a sweep: {error}.") from error
-        failures = {int(number): reason for number, reason in about["bad"].items()}
-        return Sweep(Designs(axes, about["zipped"]), about["units"], lambda: results, failures)
+            reason = f"there is no {error}" if isinstance(error, KeyError) else str(error).rstrip(".")
+            raise ValueError(f"cannot read {str(path)!r} as a sweep: {reason}.") from error
+        return Sweep(designs, units, lambda: results, failures)
 
     def __repr__(self) -> str:
         sides = " x ".join(f"{name} {side}" for name, side in zip(self.dimensions, self.shape, strict=True))

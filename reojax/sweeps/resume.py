@@ -64,6 +64,7 @@ def complete(
     for number in mine:
         if number not in found and (chunk := store.get(number)) is not None:
             found[number] = chunk.bad
+    store.check_whole(mine)
     return {design: reason for bad in found.values() for design, reason in bad.items()}
 
 

@@ -6,46 +6,46 @@
                           numbers; the hash; `bad/design` and `bad/reason`, the numbers of the bad ones and why
 
 Files appear whole: written beside, synced, and renamed. So any number of processes may work on one store, and one
-that is killed loses the chunks it is at. A file that was damaged later is noticed (checksums of the zip format).
+that is killed loses the chunks it is at. A chunk that was damaged later, in whatever way, is as one that is not there:
+its checksums (of the zip format), names, shapes, types and sizes are looked at, sizes before anything is unpacked.
 """
 
 import json
 import os
 import time
-import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from reojax._internal.archives import check_arrays, read_archive
 from reojax._internal.files import replacing
-from reojax.sweeps.chunks import Chunk, Chunking
+from reojax.sweeps.chunks import Chunk
 from reojax.sweeps.grid import Designs
-from reojax.sweeps.identity import SCHEMA, axis_identity, differences, digest
-from reojax.sweeps.outputs import Output
+from reojax.sweeps.identity import axis_identity, differences, digest
+from reojax.sweeps.manifest import Manifest, read_manifest
+from reojax.sweeps.outputs import bytes_per_design
 
 MANIFEST, AXES = "sweep.json", "axes.npz"
 _LEFT_OVER = 3600.0
 """Age from which a temporary file is one that a killed process left behind [s]."""
+_REASON = 200
+"""Most characters that are kept of why a design is bad."""
+_ROOM = 2**16
+"""Bytes of an archive beside its arrays' numbers, at most, for a few arrays more than there are."""
 
 
 class Store:
     """A folder of chunks."""
 
-    def __init__(self, folder: Path, manifest: Mapping[str, Any], designs: Designs) -> None:
+    def __init__(self, folder: Path, manifest: Manifest, designs: Designs) -> None:
         """Open what `create` or `open_store` has checked."""
         self.folder, self.designs = folder, designs
-        self.identity: dict[str, Any] = manifest["identity"]
-        self.units: dict[str, str] = manifest["units"]
+        self.identity, self.units = manifest.identity, manifest.units
+        self.outputs, self.sizes = manifest.outputs, manifest.sizes
         self.hash = digest(self.identity)
-        self.outputs = tuple(
-            Output(output["name"], tuple(output["shape"]), np.dtype(output["dtype"]))
-            for output in self.identity["results"]
-        )
-        chunk, block = self.identity["chunk"], self.identity["block"]
-        self.sizes = Chunking(designs.total, chunk, block, -(-chunk // block))
 
     def file(self, number: int) -> Path:
         """Path of a chunk."""
@@ -60,29 +60,52 @@ class Store:
         start, stop = self.sizes.bounds(chunk.number)
         members = {"hash": np.array(self.hash), "start": np.array(start), "stop": np.array(stop)}
         members["bad/design"] = np.array(list(chunk.bad), np.int64)
-        members["bad/reason"] = np.array(list(chunk.bad.values()), str)
+        members["bad/reason"] = np.array([reason[:_REASON] for reason in chunk.bad.values()], str)
         members |= {f"results/{o.name}": values for o, values in zip(self.outputs, chunk.results, strict=True)}
         with replacing(self.file(chunk.number)) as file:
             np.savez(file, allow_pickle=False, **members)
 
     def get(self, number: int) -> Chunk | None:
         """Read a chunk; None if it is not there, damaged, or of another sweep."""
-        if not self.has(number):
-            return None
         start, stop = self.sizes.bounds(number)
+        rows = stop - start
+        most = rows * (bytes_per_design(self.outputs) + 8 + 4 * _REASON) + _ROOM * (len(self.outputs) + 5)
+        results = {f"results/{output.name}": ((rows, *output.shape), output.dtype) for output in self.outputs}
         try:
-            with self.file(number).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
-                if str(file["hash"]) != self.hash or (int(file["start"]), int(file["stop"])) != (start, stop):
-                    return None
-                results = [file[f"results/{output.name}"] for output in self.outputs]
-                reasons = [str(reason) for reason in file["bad/reason"]]
-                bad = dict(zip(file["bad/design"].tolist(), reasons, strict=True))
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-            return None
-        for output, values in zip(self.outputs, results, strict=True):
-            if values.shape != (stop - start, *output.shape) or values.dtype != output.dtype:
+            arrays = read_archive(self.file(number), most)
+            check_arrays(arrays, results)
+            if str(arrays["hash"]) != self.hash or (int(arrays["start"]), int(arrays["stop"])) != (start, stop):
                 return None
-        return Chunk(number, results, bad)
+            bad = _bad(arrays["bad/design"], arrays["bad/reason"], start, stop)
+        except (KeyError, TypeError, ValueError):
+            return None
+        return Chunk(number, [arrays[name] for name in results], bad)
+
+    def check_whole(self, numbers: Iterable[int]) -> None:
+        """Look once more, at the end, whether everything is where it was put.
+
+        Raises:
+            ValueError: if the folder, or a chunk, has gone, or the folder is another sweep's by now.
+        """
+        lost = [number for number in numbers if not self.has(number)]
+        if lost:
+            what = f"chunk {lost[0]}" if len(lost) == 1 else f"{len(lost)} chunks, the first one {lost[0]},"
+            raise ValueError(f"while the sweep ran, the store {str(self.folder)!r} has lost {what}; run it again.")
+        if open_store(self.folder).hash != self.hash:
+            raise ValueError(f"while the sweep ran, another one took the store {str(self.folder)!r}.")
+
+
+def _bad(designs: np.ndarray, reasons: np.ndarray, start: int, stop: int) -> dict[int, str]:
+    """The bad designs of a chunk, if they can be its own.
+
+    Raises:
+        ValueError: if not.
+    """
+    numbers = designs.tolist()
+    fit = designs.dtype == np.int64 and designs.ndim == 1 and all(start <= number < stop for number in numbers)
+    if not fit or len(set(numbers)) < len(numbers) or reasons.dtype.kind != "U":
+        raise ValueError("its bad designs are none of the chunk's")
+    return dict(zip(numbers, map(str, reasons), strict=True))
 
 
 def create(
@@ -118,16 +141,16 @@ def open_store(folder: str | os.PathLike[str]) -> Store:
     """
     place = Path(folder)
     try:
-        manifest = json.loads((place / MANIFEST).read_text())
-        if manifest["identity"]["schema"] != SCHEMA:
-            raise ValueError(f"its layout is {manifest['identity']['schema']!r}; this reojax reads {SCHEMA!r}")
-        with np.load(place / AXES, allow_pickle=False) as file:
-            axes = {name: file[f"axes/{name}"] for name in manifest["identity"]["order"]}
-        if {name: axis_identity(values) for name, values in axes.items()} != manifest["identity"]["axes"]:
+        manifest = read_manifest(place / MANIFEST)
+        room = sum(shape[0] * dtype.itemsize for shape, dtype in manifest.axes.values())
+        arrays = read_archive(place / AXES, room + _ROOM * (len(manifest.axes) + 1))
+        check_arrays(arrays, {f"axes/{name}": expected for name, expected in manifest.axes.items()})
+        axes = {name: arrays[f"axes/{name}"] for name in manifest.axes}
+        if {name: axis_identity(values) for name, values in axes.items()} != manifest.identity["axes"]:
             raise ValueError(f"{AXES} and {MANIFEST} do not belong together")
-        return Store(place, manifest, Designs(axes, manifest["identity"]["zipped"]))
-    except Exception as error:
-        raise ValueError(f"{str(folder)!r} is not the store of a sweep: {_text(error)}.") from error
+    except ValueError as error:
+        raise ValueError(f"{str(folder)!r} is not the store of a sweep: {str(error).rstrip('.')}.") from error
+    return Store(place, manifest, Designs(axes, manifest.zipped))
 
 
 def _write_once(path: Path, text: str) -> None:
@@ -154,7 +177,3 @@ def _sweep_out(folder: Path) -> None:
         with suppress(FileNotFoundError):  # another process has just renamed it
             if time.time() - file.stat().st_mtime > _LEFT_OVER:
                 file.unlink()
-
-
-def _text(error: Exception) -> str:
-    return f"there is no {error}" if isinstance(error, KeyError) else str(error).rstrip(".")

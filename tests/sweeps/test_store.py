@@ -3,10 +3,13 @@
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
 import time
+import tracemalloc
+import zipfile
 from functools import partial
 from pathlib import Path
 
@@ -18,7 +21,7 @@ from helpers import sweep_child
 
 import reojax
 from reojax.sweeps import merge
-from reojax.sweeps.store import Store
+from reojax.sweeps.store import Store, open_store
 
 CHILD = Path(sweep_child.__file__)
 AXES = {"x": np.arange(6.0), "y": np.array([1.0, 2.0])}
@@ -83,6 +86,128 @@ def test_a_damaged_chunk_is_noticed_and_done_again(tmp_path, damage):
         merge(tmp_path / "s")
     np.testing.assert_array_equal(small(tmp_path / "s").results["sides"], whole)
     assert path.read_bytes() == good
+
+
+def test_no_damage_is_an_error_and_none_goes_unseen(tmp_path):
+    """One bit flipped in every second byte of a chunk, zip directory included: as good as not there, or the same."""
+    function = lambda x, y: {"a": jnp.sqrt(x - 2) * y}
+    small(tmp_path / "s", function)
+    store = open_store(tmp_path / "s")
+    whole = store.get(0)
+    good, bits, noticed = store.file(0).read_bytes(), random.Random(2), 0
+    assert whole is not None
+    assert len(whole.bad) == 4
+    for place in range(0, len(good), 2):
+        store.file(0).write_bytes(good[:place] + bytes([good[place] ^ 1 << bits.randrange(8)]) + good[place + 1 :])
+        found = store.get(0)
+        noticed += found is None
+        if found is not None:
+            np.testing.assert_array_equal(found.results[0], whole.results[0])
+            assert found.bad == whole.bad
+    assert noticed > 0.4 * len(good)
+
+
+def rewritten(file, compression=zipfile.ZIP_STORED, **changed):
+    """The archive with other arrays in it."""
+    arrays = {**dict(np.load(file)), **changed}
+    with zipfile.ZipFile(file, "w", compression) as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w") as member:
+                np.lib.format.write_array(member, np.asarray(array))
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"bad/design": np.array([5]), "bad/reason": np.array(["of another chunk"])},
+        {"bad/design": np.array([0, 0]), "bad/reason": np.array(["twice", "twice"])},
+        {"bad/design": np.array([0.5]), "bad/reason": np.array(["no number"])},
+        {"bad/design": np.array([1, 2]), "bad/reason": np.array(["one for two"])},
+        {"start": np.array([0, 1])},
+        {"hash": np.arange(3)},
+        {"results/area": np.zeros((5, 1))},
+        {"results/sides": np.zeros((5, 2), np.float32)},
+    ],
+)
+def test_a_chunk_with_other_arrays_is_none(tmp_path, changed):
+    small(tmp_path / "s")
+    store = open_store(tmp_path / "s")
+    rewritten(store.file(0))
+    assert store.get(0) is not None
+    rewritten(store.file(0), **changed)
+    assert store.get(0) is None
+
+
+def test_a_bomb_is_not_unpacked(tmp_path):
+    """What would be 800 MB is refused by its size; so is a saved sweep."""
+    small(tmp_path / "s")
+    store = open_store(tmp_path / "s")
+    bomb = np.broadcast_to(0.0, (10**8,))
+    rewritten(store.file(0), zipfile.ZIP_DEFLATED, **{"results/area": bomb})
+    tracemalloc.start()
+    assert store.get(0) is None
+    with pytest.raises(ValueError, match="cannot read .* is compressed"):
+        reojax.Sweep.load(store.file(0))
+    assert tracemalloc.get_traced_memory()[1] < 1e7
+    tracemalloc.stop()
+
+
+HOSTILE = [None, True, -1, 0, 1, 2.5, 10**30, "", "x", "float64", [], [1], [-1], {}, {"x": 1}]
+
+
+def places(data, at=()):
+    """Every entry of a JSON document, as a chain of keys."""
+    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    yield at
+    for key, value in items:
+        yield from places(value, (*at, key))
+
+
+def test_no_entry_of_a_manifest_is_believed(tmp_path):
+    """Each is replaced by each of a list of hostile values: a clear refusal, or results as they were."""
+    whole = small(tmp_path / "s", partial(with_robot, PROTOTYPE), units={"x": "m"}).results["area"]
+    file = tmp_path / "s" / "sweep.json"
+    good, refusals = file.read_text(), []
+    for place in places(json.loads(good)):
+        for value in HOSTILE:
+            data = json.loads(good)
+            inner = data
+            for key in place[:-1]:
+                inner = inner[key]
+            if place:
+                inner[place[-1]] = value
+            file.write_text(json.dumps(data if place else value))
+            try:
+                merged = merge(tmp_path / "s").results["area"]
+            except ValueError as error:
+                refusals.append(str(error))
+            else:
+                np.testing.assert_array_equal(merged, whole)
+    assert len(refusals) > 400
+    assert all("is not the store of a sweep" in text or "of 3 chunks in" in text for text in refusals)
+
+
+@pytest.mark.parametrize("text", ["[" * 10**5, "\ud800", '{"identity": NaN}', "\x00"])
+def test_a_manifest_that_is_no_json(tmp_path, text):
+    small(tmp_path / "s")
+    (tmp_path / "s" / "sweep.json").write_text(text, errors="surrogatepass")
+    with pytest.raises(ValueError, match="is not the store of a sweep"):
+        merge(tmp_path / "s")
+
+
+@pytest.mark.parametrize("when", [1, 3])
+def test_a_store_that_goes_while_the_sweep_runs_is_noticed(tmp_path, monkeypatch, when):
+    put, done = Store.put, []
+
+    def put_and_remove(self, chunk):
+        put(self, chunk)
+        done.append(chunk.number)
+        if len(done) == when:
+            shutil.rmtree(self.folder)
+
+    monkeypatch.setattr(Store, "put", put_and_remove)
+    with pytest.raises(ValueError, match=r"has lost 3 chunks, the first one 0|there is no folder"):
+        small(tmp_path / "s")
 
 
 def other_area(x, y):
