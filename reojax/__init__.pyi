@@ -10,6 +10,7 @@ from reojax.collision.clearance import clearance
 from reojax.files.trajectories import write_trajectory
 from reojax.manoeuvres import FOUR_BODY, SIX_BODY, Layout, manoeuvre_a, manoeuvre_b
 from reojax.mechanics.certificate import Certificate, certify
+from reojax.mechanics.controllable import ControllableDirections, controllable_directions
 from reojax.mechanics.curvature import curvature
 from reojax.mechanics.dynamics import (
     base_velocity,
@@ -55,6 +56,8 @@ __all__ = [
     "clearance",
     "Comparison",
     "connection",
+    "controllable_directions",
+    "ControllableDirections",
     "curvature",
     "design",
     "Fastest",

@@ -35,8 +35,15 @@ def curvature(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "3 j j"]:
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
+    return curvature_terms(robot, theta)[2]
+
+
+def curvature_terms(
+    robot: Robot, theta: Float[Array, " j"]
+) -> tuple[Float[Array, "3 j"], Float[Array, "3 j j"], Float[Array, "3 j j"]]:
+    """The connection, its slope `[:, k, i] = d_i Gamma_k`, and its curvature at a shape."""
     gamma = connection(robot, theta)
     theta = jnp.asarray(theta, gamma.dtype)
-    slope = jax.jacfwd(connection, argnums=1)(robot, theta)  # [:, k, i] = d_i Gamma_k
+    slope = jax.jacfwd(connection, argnums=1)(robot, theta)
     bracket = jnp.cross(gamma[:, :, None], gamma[:, None, :], axis=0)
-    return jnp.swapaxes(slope, 1, 2) - slope + bracket
+    return gamma, slope, jnp.swapaxes(slope, 1, 2) - slope + bracket
