@@ -134,6 +134,8 @@ def test_gradient_and_hessian_are_those_of_differences():
     for field in ("capsule_radius", "capsule_end", "anchor"):
         value = getattr(robot, field)
         change = RNG.normal(size=value.shape)
+        if field == "capsule_end":  # a sphere that grows into a capsule has a kink
+            change[(value == robot.capsule_start).all(1)] = 0
         ends = [clearance(robot.replace(**{field: value + s * h * change}), theta).sum() for s in (1, -1)]
         np.testing.assert_allclose((getattr(by_robot, field) * change).sum(), (ends[0] - ends[1]) / (2 * h), atol=1e-6)
 
