@@ -6,7 +6,7 @@ of Scientific Python), so that `import reojax`, and with it the command line's h
 
 import ast
 import importlib
-from pathlib import Path
+import pathlib
 from typing import Any
 
 
@@ -14,7 +14,7 @@ def _listed() -> tuple[dict[str, str], list[str]]:
     """Where each public name comes from, and `__all__`, out of the stub."""
     home: dict[str, str] = {}
     names: list[str] = []
-    for node in ast.parse(Path(__file__).with_suffix(".pyi").read_text("utf-8")).body:
+    for node in ast.parse(pathlib.Path(__file__).with_suffix(".pyi").read_text("utf-8")).body:
         if isinstance(node, ast.ImportFrom) and node.module:
             home |= {alias.name: node.module for alias in node.names}
         elif isinstance(node, ast.Assign):
