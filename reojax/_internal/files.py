@@ -81,13 +81,16 @@ def reading(path: str | os.PathLike[str], most: int | None = None) -> Iterator[B
     with _clearly("read", path):
         # without waiting for a writer, should it be a pipe
         number = os.open(target, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        status = os.fstat(number)
+        wrong = None
+        if not stat.S_ISREG(status.st_mode):
+            wrong = "it is a folder" if stat.S_ISDIR(status.st_mode) else "it is not a regular file"
+        elif most is not None and status.st_size > most:
+            wrong = f"it has {status.st_size} bytes, more than {most}"
+        if wrong is not None:
+            os.close(number)
+            raise ValueError(f"cannot read {_shown(path)}: {wrong}.")
         with os.fdopen(number, "rb") as file:
-            status = os.fstat(number)
-            if not stat.S_ISREG(status.st_mode):
-                raise ValueError(f"cannot read {_shown(path)}: it is not a regular file.")
-            if most is not None and status.st_size > most:
-                size = f"{status.st_size} bytes, more than {most}"
-                raise ValueError(f"cannot read {_shown(path)}: it has {size}.")
             yield file
 
 

@@ -3,7 +3,7 @@
 A header, then one row per frame. Columns, in any order, others are ignored:
 
     time                              [s], or time_ms; strictly increasing, at any rate
-    theta1_deg ... or NAME_rad ...    joint angles, by number from 1 or by the robot's joint names
+    NAME_rad ... or theta1_deg ...    joint angles, by the robot's joint names or, if none is like theta1, by number
     qw, qx, qy, qz                    orientation of link 1 (the base) as a unit quaternion
     zxz1_deg, zxz2_deg, zxz3_deg      or as ZXZ angles
 
@@ -14,7 +14,6 @@ a cell left empty (or NaN): that is a gap.
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 from collections.abc import Iterator
@@ -25,12 +24,15 @@ import numpy as np
 from jaxtyping import Float
 
 from reojax._internal.arrays import as_numbers
-from reojax.captures.columns import Columns, read_header
+from reojax._internal.checks import instance, one_of, shorten
+from reojax._internal.files import reading
+from reojax.captures.columns import Columns, read_header, split
 from reojax.robot import Robot
 
 UNIT_TOLERANCE = 0.02
 """Largest difference of a quaternion's length from 1; within it the quaternion is normalised."""
 _GAPS = {"", "nan", "na", "n/a", "null", "none"}
+_LONGEST_LINE = 2**20
 _LATEST = 1e11
 """Largest time that can be meant [s]; clocks that count from 1970 stand at 1.8e9."""
 
@@ -111,21 +113,22 @@ def read_capture(path: str | os.PathLike[str], robot: Robot, *, angle_unit: str 
     Raises:
         ValueError: naming file and line, for what cannot be read or cannot be meant.
     """
-    if angle_unit not in (None, "deg", "rad"):
-        raise ValueError(f"`angle_unit` is {angle_unit!r}; it must be 'deg' or 'rad'.")
+    instance("robot", robot, Robot, "`make_robot` makes")
+    if angle_unit is not None:
+        one_of("angle_unit", angle_unit, ("deg", "rad"))
     lines = _lines(path)
-    number, header = next(lines, (0, ""))
+    number, text = next(lines, (0, ""))
     if not number:
         raise ValueError(f"{path}: the file is empty.")
-    delimiter = max(",;\t", key=header.count)
     with _at(path, number):
-        columns = read_header(_cells(header, delimiter), robot.joint_names, angle_unit)
-        width = len(_cells(header, delimiter))
+        header, delimiter = split(text)
+        columns = read_header(header, robot.joint_names, angle_unit)
+        width = len(header)
     largest = [_beyond_reason(low, high) for low, high in zip(robot.lower, robot.upper, strict=True)]
     time, theta, rotation = [], [], []
     for number, text in lines:
         with _at(path, number):
-            cells = _cells(text, delimiter)
+            cells, _ = split(text, delimiter)
             if len(cells) != width:
                 raise ValueError(f"the line has {len(cells)} cells; the header has {width}.")
             when = _number(cells[columns.time], "time") * columns.to_seconds
@@ -161,15 +164,19 @@ def read_capture(path: str | os.PathLike[str], robot: Robot, *, angle_unit: str 
 
 def _lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, str]]:
     """Numbers and texts of the lines that are neither blank nor comments."""
-    try:
-        with open(path, encoding="utf-8-sig") as file:
-            for number, text in enumerate(file, 1):
-                if text.strip() and not text.lstrip().startswith("#"):
-                    yield number, text
-    except OSError as error:
-        raise ValueError(f"cannot read {str(path)!r}: {error.strerror or error}.") from error
-    except UnicodeDecodeError as error:
-        raise ValueError(f"cannot read {str(path)!r}: it is not text in UTF-8.") from error
+    number = 0
+    with reading(path) as file:
+        while line := file.readline(_LONGEST_LINE + 1):
+            if len(line) > _LONGEST_LINE:
+                raise ValueError(f"{path}, line {number + 1}: it has more than {_LONGEST_LINE} bytes.")
+            try:
+                text = line.decode("utf-8" if number else "utf-8-sig")
+            except UnicodeDecodeError:
+                raise ValueError(f"cannot read {str(path)!r}: it is not text in UTF-8.") from None
+            for part in text.rstrip("\r\n").split("\r"):  # old files end their lines with a carriage return alone
+                number += 1
+                if part.strip() and not part.lstrip().startswith("#"):
+                    yield number, part
 
 
 @contextmanager
@@ -177,12 +184,8 @@ def _at(path: str | os.PathLike[str], number: int) -> Iterator[None]:
     """Put file and line before the message of a `ValueError`."""
     try:
         yield
-    except (ValueError, csv.Error) as error:
+    except ValueError as error:
         raise ValueError(f"{path}, line {number}: {error}") from error
-
-
-def _cells(text: str, delimiter: str) -> list[str]:
-    return [cell.strip() for cell in next(csv.reader([text.strip("\r\n")], delimiter=delimiter))]
 
 
 def _number(cell: str, what: str) -> float:
@@ -193,7 +196,7 @@ def _number(cell: str, what: str) -> float:
     except ValueError:
         value = math.inf
     if not math.isfinite(value):
-        raise ValueError(f"{what} is {cell!r}; it must be a finite number, or empty where nothing was seen.")
+        raise ValueError(f"{what} is {shorten(cell)}; it must be a finite number, or empty where nothing was seen.")
     return value
 
 

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import as_numbers
+from reojax._internal.checks import shorten
 from reojax._internal.files import check_ending, replacing
+from reojax.captures.columns import read_header, split
 from reojax.robot import Robot
 
 FORMATS = ("csv", "yaml", "yml", "json")
@@ -56,7 +58,8 @@ def write_trajectory(
 
     Raises:
         ValueError: for wrong shapes, numbers that are not finite, times that do not increase by a nanosecond or more,
-            a start or end in motion (ROS 2), a negative delay, or a path that cannot be written.
+            a start or end in motion (ROS 2), a negative delay, joint names that could not be read back from a .csv,
+            or a path that cannot be written.
     """
     check_trajectory(path)
     columns = {"positions": theta, "velocities": theta_dot, "accelerations": theta_ddot}
@@ -112,8 +115,24 @@ def _csv(robot: Robot, time: np.ndarray, arrays: dict[str, np.ndarray]) -> str:
     header += [f"{units[key][0]}{name} [{units[key][1]}]" for key in arrays for name in robot.joint_names]
     rows = np.concatenate([time[:, None], *arrays.values()], axis=1)
     lines = [",".join(_quote(cell) for cell in header)]
+    _check_readable(robot, lines[0], len(header))
     lines += [",".join(f"{x:.12g}" for x in row) for row in rows]
     return "\n".join(lines) + "\n"
+
+
+def _check_readable(robot: Robot, header: str, width: int) -> None:
+    """Refuse joint names whose columns another program, or `read_capture`, could mistake."""
+    for name in robot.joint_names:
+        if any(not mark.isprintable() for mark in name) or name != name.strip():
+            raise ValueError(f"a .csv cannot have a joint named {shorten(name)}: no marks that do not print, please.")
+    try:
+        cells, _ = split(header)
+        joints = read_header(cells, robot.joint_names, None).joints if len(cells) == width else ()
+    except ValueError as error:
+        raise ValueError(f"with these joint names a .csv could not be read back: {error}") from error
+    if joints != tuple(range(1, robot.joints + 1)):
+        names = shorten(", ".join(robot.joint_names))
+        raise ValueError(f"the columns of a .csv could not be told apart with the joint names {names}.")
 
 
 def _quote(cell: str) -> str:

@@ -98,7 +98,7 @@ JOINTS = "time,theta1_rad,theta2_rad,theta3_rad"
         (csv(JOINTS), "the file has 0 lines of data; a motion needs two"),
         (csv(JOINTS, "0,0,0,0"), "the file has 1 lines of data"),
         (csv("theta1_rad,theta2_rad,theta3_rad", "0,0,0"), "line 1: there is no column 'time'; the columns are th"),
-        (csv("time,theta1_rad,theta3_rad", "0,0,0"), r"line 1: column 'theta2' \(joint 'bend'\) is missing"),
+        (csv("time,theta1_rad,theta3_rad", "0,0,0"), r"line 1: the column of joint 'bend' \(or theta2\) is missing"),
         (csv("time,qw,qx,qz", "0,1,0,0"), "line 1: column 'qy' is missing"),
         (csv("time,x,y", "0,1,0"), "line 1: there are neither joint angles"),
         (csv(JOINTS + ",bend_deg", "0,0,0,0,0"), "columns 'theta2_rad' and 'bend_deg' are the same quantity"),
@@ -289,7 +289,10 @@ def test_the_command_line_prints_and_draws_what_the_library_computes(capsys, tmp
     ("arguments", "message"),
     [
         (["nowhere.csv"], "reojax compare: cannot read 'nowhere.csv': No such file"),
-        ([str(SHIPPED), "--robot", "six_body"], f"reojax compare: {SHIPPED}, line 5: column 'theta4'"),
+        (
+            [str(SHIPPED), "--robot", "six_body"],
+            f"reojax compare: {SHIPPED}, line 5: the column of joint 'twist2' (or theta4)",
+        ),
         ([str(SHIPPED), "--out", "a.bmp"], "reojax compare: cannot write 'a.bmp': the name of"),
         ([str(SHIPPED), "--calibrate", "weight"], "reojax compare: there is no parameter 'weight'"),
         ([], "reojax compare: the following arguments are required: CAPTURE.csv"),
@@ -318,3 +321,29 @@ def test_a_planned_manoeuvre_is_compared_too(capsys, monkeypatch):
     assert report["config"]["simulated_from"] == "manoeuvre A, twist 270 deg, bend 120 deg, quintic"
     assert main(["compare", str(SHIPPED), "--manoeuvre", "a"]) == 2
     assert "--duration is missing" in capsys.readouterr().err
+
+
+def test_only_files_are_read(tmp_path):
+    """A device has no end, a pipe waits, a number may be an open stream of this process."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for path, message in (
+        ("/dev/zero", "it is not a regular file"),
+        (pipe, "it is not a regular file"),
+        (tmp_path, "it is a folder"),
+        (1, "it is a int, not the path of a file"),
+        (None, "it is a NoneType, not the path"),
+        (b"c.csv", "it is a bytes, not the path"),
+        ("c\0.csv", "no path has a zero byte"),
+    ):
+        with pytest.raises(ValueError, match=f"cannot read .*{message}"):
+            reojax.read_capture(path, ROBOT)
+    os.fstat(1)  # still open
+    (tmp_path / "long.csv").write_text("time" * 10**6)
+    with pytest.raises(ValueError, match="line 1: it has more than 1048576 bytes"):
+        reojax.read_capture(tmp_path / "long.csv", ROBOT)
+
+
+def test_carriage_returns_end_lines_too(tmp_path):
+    (tmp_path / "c.csv").write_bytes(b"time,theta1_rad,theta2_rad,theta3_rad\r0,0,0,0\r1,.1,.2,.3\r")
+    np.testing.assert_array_equal(reojax.read_capture(tmp_path / "c.csv", ROBOT).theta[1], [0.1, 0.2, 0.3])

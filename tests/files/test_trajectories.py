@@ -3,9 +3,11 @@
 import csv
 import json
 import os
+import tempfile
 
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 from reojax import read_capture, robots
 from reojax.cli import main
@@ -51,6 +53,58 @@ def test_joint_trajectory(tmp_path, ending):
     assert all(0 <= stamp["nanosec"] < 10**9 and isinstance(stamp["sec"], int) for stamp in stamps)
     write_trajectory(file, ROBOT, *MOTION, RATE)
     np.testing.assert_array_equal([point["effort"] for point in json.loads(file.read_text())["points"]], RATE)
+
+
+AWKWARD = ["theta1", "theta2", "theta3", "zxz1", "zxz2", "zxz3", "qw", "qx", "time", "t", "rate theta1", "a_rad", "a"]
+AWKWARD += [
+    "time [s]",
+    "Theta1",
+    "a b",
+    "a_b",
+    "#",
+    "",
+    " ",
+    "nan",
+    "arm [deg]",
+    "arm",
+    "theta2 [rad]",
+    "a;b;c;d;e;f;g",
+    '"',
+]
+NAMES = st.lists(st.sampled_from(AWKWARD) | st.text(max_size=6), min_size=3, max_size=3, unique=True)
+
+
+@settings(max_examples=100, deadline=None)
+@given(NAMES)
+def test_a_csv_is_read_back_as_it_was_written_or_refused(names):
+    """Whatever the joints are called: theirs come first, also if they are called as another column or joint is."""
+    robot = ROBOT.replace(joint_names=tuple(names))
+    with tempfile.TemporaryDirectory() as folder:
+        file = os.path.join(folder, "t.csv")
+        try:
+            write_trajectory(file, robot, *MOTION, RATE)
+        except ValueError:
+            assert os.listdir(folder) == []
+            return
+        capture = read_capture(file, robot)
+    np.testing.assert_allclose(capture.theta, THETA, atol=1e-11)
+    assert capture.rotation is None
+
+
+@pytest.mark.parametrize(
+    "names", [("theta2", "theta1", "theta3"), ("zxz1", "zxz2", "zxz3"), ("qw", "time", "t"), ("theta1", "Theta1", "x")]
+)
+def test_names_of_other_columns_are_the_joints_own(tmp_path, names):
+    robot = ROBOT.replace(joint_names=names)
+    write_trajectory(tmp_path / "t.csv", robot, *MOTION)
+    np.testing.assert_allclose(read_capture(tmp_path / "t.csv", robot).theta, THETA, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", ["two\nlines", "tab\t", "\x00", " space"])
+def test_names_with_marks_that_do_not_print_are_refused(tmp_path, name):
+    with pytest.raises(ValueError, match="cannot have a joint named"):
+        write_trajectory(tmp_path / "t.csv", ROBOT.replace(joint_names=("a", name, "b")), *MOTION)
+    assert os.listdir(tmp_path) == []
 
 
 def test_only_rest_to_rest_goes_to_a_controller(tmp_path):
