@@ -1,0 +1,1 @@
+"""What pictures and the viewer share: the look of links, colours, and from where one looks. No matplotlib here."""

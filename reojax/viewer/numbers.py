@@ -1,0 +1,68 @@
+"""The numbers beside a picture: what a motion comes to, as rows of text."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from reojax import so3
+from reojax.mechanics.attitude import tilt_and_roll
+from reojax.viewer.clip import Clip
+
+_MINUS = "\N{MINUS SIGN}"
+
+
+def rows(clip: Clip, target: Float[np.ndarray, "3 3"] | None) -> dict[str, str]:
+    """What there is to say of a motion, by name."""
+    end = clip.rotation[0].T @ clip.rotation[-1]
+    vector = np.rad2deg(np.asarray(so3.log(end), float))
+    told = {
+        "net rotation vector": f"({', '.join(_fixed(x, 2) for x in vector)})°",
+        "net rotation angle": f"{_fixed(np.linalg.norm(vector), 3)}°",
+    }
+    if clip.rotation[:, 2, 2].min() > -0.999:  # where z is never turned upside down, the roll can be counted on
+        roll = tilt_and_roll(clip.rotation)[:, 2]
+        told["roll about z, counted on"] = f"{_fixed(np.rad2deg(roll[-1] - roll[0]), 2)}°"
+    if target is not None:
+        told["left to the target"] = f"{np.rad2deg(angle_to(clip.rotation[-1:], target)[0]):.3g}°"
+    told["joint travel, all joints"] = f"{np.rad2deg(clip.travel):.0f}°"
+    if clip.timed:
+        told["duration"] = f"{clip.clock[-1]:.4g} s"
+    told |= _of_motors(clip) | _of_certificate(clip)
+    return told
+
+
+def angle_to(rotation: Float[np.ndarray, "m 3 3"], target: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, " m"]:
+    """Angle of the turn from each rotation to the target [rad]; exact near 0 too, where an arc cosine is not."""
+    turn = np.einsum("mji,jk->mik", rotation, target)
+    sine = np.stack([turn[:, i, k] - turn[:, k, i] for i, k in ((2, 1), (0, 2), (1, 0))], axis=1)
+    return np.arctan2(np.linalg.norm(sine, axis=1), np.trace(turn, axis1=1, axis2=2) - 1)
+
+
+def _of_motors(clip: Clip) -> dict[str, str]:
+    if clip.motion is None:
+        return {}
+    told = {
+        "fastest joint": f"{np.abs(clip.motion.theta_dot).max():.3g} rad/s",
+        "largest joint torque": f"{np.abs(clip.motion.torque).max():.3g} N m",
+    }
+    if clip.motion.margin is not None:
+        told["least motor margin"] = f"{_fixed(100 * float(np.min(clip.motion.margin)), 0)} % of the supply"
+    return told
+
+
+def _of_certificate(clip: Clip) -> dict[str, str]:
+    if clip.certificate is None:
+        return {}
+    certificate = clip.certificate
+    return {
+        "certificate: momentum left": f"{float(certificate.momentum):.0e} of what links exchange",
+        "certificate: R\u1d40R \u2212 1": f"{float(certificate.orthogonality):.0e}",
+        "certificate: step halved": f"{float(certificate.halving):.0e} rad",
+        "certificate: end of history": f"{float(certificate.endpoint):.0e} rad",
+    }
+
+
+def _fixed(value: float, digits: int) -> str:
+    text = f"{value:.{digits}f}"
+    return f"{0:.{digits}f}" if float(text) == 0 else text.replace("-", _MINUS)

@@ -1,0 +1,3 @@
+export { WebGLRenderer, Scene, PerspectiveCamera, Group, Mesh, LineSegments, Line, BufferGeometry, BufferAttribute, Float32BufferAttribute, MeshStandardMaterial, MeshBasicMaterial, LineBasicMaterial, LineDashedMaterial, HemisphereLight, DirectionalLight, Sprite, SpriteMaterial, CanvasTexture, CapsuleGeometry, SphereGeometry, CylinderGeometry, ConeGeometry, TorusGeometry, CircleGeometry, Vector3, Quaternion, Matrix4, Color, DoubleSide } from 'three';
+export { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+export { toCreasedNormals } from 'three/addons/utils/BufferGeometryUtils.js';
