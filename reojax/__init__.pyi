@@ -39,6 +39,7 @@ from reojax.sweeps.grid import zipped
 from reojax.sweeps.merge import merge
 from reojax.sweeps.result import BadDesign, Sweep
 from reojax.sweeps.sweep import sweep
+from reojax.viewer.html import view
 
 __all__ = [
     "along",
@@ -127,6 +128,7 @@ __all__ = [
     "Tracking",
     "Trajectory",
     "trapezoid",
+    "view",
     "with_motors",
     "write_trajectory",
     "zipped",

@@ -17,7 +17,7 @@ PACKAGE = ROOT / "reojax"
 
 ORDER = (
     "_internal session so3 path manoeuvres capsules robot sweeps mechanics collision robots models interop "
-    "optimisation motion design planning captures steering files plot viewer cli"
+    "optimisation motion design planning captures steering files drawing plot viewer cli"
 ).split()
 """Packages and single modules, each of which imports only what stands before it."""
 

@@ -48,7 +48,7 @@ def joint_faces(robot: Robot) -> list[Faces]:
 
 def size(robot: Robot) -> float:
     """About the length of the longest branch, from the base frame's origin [m]."""
-    spread = np.sqrt([np.trace(_second_moment(robot, i)) / robot.mass[i] for i in range(robot.links)])
+    spread = np.sqrt([np.trace(_spread(robot, i)) for i in range(robot.links)])
     com = np.asarray(robot.com, float)
     reach = [np.linalg.norm(com[0]) + 1.5 * spread[0]]
     path = [0.0]
@@ -114,7 +114,7 @@ def _joints(robot: Robot, link: int) -> tuple[list[np.ndarray], list[np.ndarray]
 
 def _solid(robot: Robot, link: int, thin: float) -> tuple[np.ndarray, np.ndarray, int]:
     """Frame, half sides and number of sides of the uniform cylinder or box with a link's mass and inertia."""
-    values, frame = np.linalg.eigh(_second_moment(robot, link) / robot.mass[link])  # ascending
+    values, frame = np.linalg.eigh(_spread(robot, link))  # ascending
     values = np.maximum(values, 0)
     odd = _odd_one(values)
     if odd is None:
@@ -131,12 +131,12 @@ def _hide_inner_faces(robot: Robot, link: int) -> bool:
     neighbours = [(p, k + 1, np.asarray(robot.anchor[k], float)) for k, p in enumerate(robot.parent)]
     shifts = [(child, shift) for p, child, shift in neighbours if p == link]
     shifts += [(p, -shift) for p, child, shift in neighbours if child == link]
-    mine = _second_moment(robot, link) / robot.mass[link]
+    mine = _spread(robot, link)
     near = 0.01 * np.sqrt(np.trace(mine))
     return any(
         robot.mass[other] > robot.mass[link]
         and np.linalg.norm(robot.com[other] + shift - robot.com[link]) < near
-        and np.abs(_second_moment(robot, other) / robot.mass[other] - mine).max() < 0.02 * np.trace(mine)
+        and np.abs(_spread(robot, other) - mine).max() < 0.02 * np.trace(mine)
         for other, shift in shifts
     )
 
@@ -165,14 +165,14 @@ def _bent(robot: Robot, link: int, joint: np.ndarray, axis: np.ndarray, thin: fl
     com = np.asarray(robot.com[link], float) - joint
     across = com - axis * (axis @ com)
     offset = np.linalg.norm(across)
-    about = _second_moment(robot, link) / robot.mass[link] + np.outer(com, com)
+    about = _spread(robot, link) + np.outer(com, com)
     if offset**4 <= _SIDE * (across @ about @ across):
         return None
     tip = about @ across / offset**2
     if com @ tip >= _BENT * np.linalg.norm(com) * np.linalg.norm(tip):
         return None
     knee = axis * (axis @ tip)
-    least = np.sqrt(max(np.linalg.eigvalsh(_second_moment(robot, link) / robot.mass[link])[0], 0))
+    least = np.sqrt(max(np.linalg.eigvalsh(_spread(robot, link))[0], 0))
     radius = max(min(2 * least, 0.2 * np.linalg.norm(tip - knee)), thin / 2)
     foot = (tip - knee) / np.linalg.norm(tip - knee)
     side = np.cross(axis, foot)
@@ -181,11 +181,14 @@ def _bent(robot: Robot, link: int, joint: np.ndarray, axis: np.ndarray, thin: fl
     return np.concatenate([beam(joint, joint + knee + up, radius), beam(joint + knee, joint + tip, radius), insert])
 
 
-def _second_moment(robot: Robot, link: int) -> np.ndarray:
-    """Second moment of mass about the centre of mass, `trace(I) / 2 - I` [kg m^2]."""
+def _spread(robot: Robot, link: int) -> np.ndarray:
+    """Second moment of mass about the centre of mass by mass, `(trace(I) / 2 - I) / m` [m^2]; 0 of a massless link."""
+    mass = float(robot.mass[link])
+    if mass <= 0:
+        return np.zeros((3, 3))
     inertia = np.asarray(robot.inertia[link], float)
     inertia = (inertia + inertia.T) / 2
-    return np.trace(inertia) / 2 * np.eye(3) - inertia
+    return (np.trace(inertia) / 2 * np.eye(3) - inertia) / mass
 
 
 def _odd_one(values: np.ndarray) -> int | None:

@@ -1,10 +1,10 @@
 """Pictures. The only package that imports matplotlib, and without its global state.
 
 Functions named `draw_...` draw onto given axes and return them; those named `..._figure` make a figure, and `save`
-and `animation` write files. Robots are drawn from their numbers, see `reojax.plot._solids`.
+and `animation` write files. Robots are drawn from their numbers, see `reojax.drawing.solids`.
 """
 
-from reojax.plot._view import View as View
+from reojax.drawing.view import View as View
 from reojax.plot.capture import comparison_figure as comparison_figure
 from reojax.plot.control import bandwidth_figure as bandwidth_figure, tracking_figure as tracking_figure
 from reojax.plot.files import FORMATS as FORMATS, check_picture as check_picture, save as save

@@ -1,18 +1,10 @@
-"""Colours that colour-blind people can tell apart and that print, and the look of axes."""
+"""The look of axes."""
 
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, MultipleLocator
 
-INK, GREY, PALE = "#222222", "#888888", "#d9d9d9"
-JOINTS = ("#0072b2", "#e69f00", "#56b4e9", "#7f3c8d", "#80ba5a", "#666666")
-"""Colours of joints, in order."""
-BASE = "#d55e00"
-LINKS = ("#a9c8de", "#dfe3e6", "#3f7fb5", "#f0c75e")
-"""Colours of links after the base, in order."""
-ANGLES = (("tilt about x", "#009e73"), ("tilt about y", "#cc79a7"), ("roll about z", "#d55e00"))
-"""The base's angles, as `tilt_and_roll` gives them, and their colours."""
-DASHES = ((None, None), (None, None), (5, 2.5), (1.5, 1.5))
-"""By joint; two joints may move alike, and the one drawn last must not hide the other."""
+from reojax.drawing.colours import GREY, INK, PALE
+
 _SPACINGS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720, 1440, 3600, 7200, 18000)
 
 

@@ -7,7 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reojax.captures.comparison import Comparison
-from reojax.plot._style import GREY, INK, JOINTS, PALE, legend_above
+from reojax.drawing.colours import GREY, INK, JOINTS, PALE
+from reojax.plot._style import legend_above
 from reojax.robot import Robot
 
 _ANGLES = ("#d55e00", "#009e73", "#cc79a7")

@@ -10,9 +10,9 @@ from matplotlib.ticker import NullFormatter
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array
+from reojax.drawing.colours import GREY, INK, JOINTS, PALE
 from reojax.mechanics.attitude import tilt_and_roll
 from reojax.motion.pid import Tracking
-from reojax.plot._style import GREY, INK, JOINTS, PALE
 from reojax.robot import Robot
 
 _ANGLES = (("tilt about x", "#009e73"), ("tilt about y", "#cc79a7"), ("roll about z", "#d55e00"))

@@ -18,10 +18,10 @@ from tqdm import tqdm
 
 from reojax._internal.arrays import as_numbers
 from reojax._internal.files import check_writable, replacing
+from reojax.drawing.colours import INK
+from reojax.drawing.view import View
 from reojax.mechanics.holonomy import rotation_history
 from reojax.path import Path
-from reojax.plot._style import INK
-from reojax.plot._view import View
 from reojax.plot.robots import draw_axes, draw_robot, faces_at_pose
 from reojax.robot import Robot
 

@@ -11,10 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reojax._internal.arrays import Array
+from reojax.drawing.colours import ANGLES, DASHES, INK, JOINTS
 from reojax.mechanics.attitude import LEVEL, tilt_and_roll, zxz_without_jumps
 from reojax.mechanics.holonomy import rotation_history
 from reojax.path import Path
-from reojax.plot._style import ANGLES, DASHES, INK, JOINTS, dress
+from reojax.plot._style import dress
 from reojax.robot import Robot
 
 _SAMPLES = 64

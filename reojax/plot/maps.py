@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array
-from reojax.plot._style import GREY, INK, PALE
-from reojax.plot._view import View
+from reojax.drawing.colours import GREY, INK, PALE
+from reojax.drawing.view import View
 from reojax.plot.robots import draw_robot_flat, faces_at_pose
 from reojax.robot import Robot
 

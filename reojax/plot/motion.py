@@ -6,10 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from reojax.drawing.colours import ANGLES, DASHES, GREY, INK, JOINTS, PALE
 from reojax.mechanics.attitude import tilt_and_roll
 from reojax.motion.motor import Motor
 from reojax.motion.simulation import Motion
-from reojax.plot._style import ANGLES, DASHES, GREY, INK, JOINTS, PALE
 from reojax.robot import Robot
 
 _RPM = 30 / np.pi

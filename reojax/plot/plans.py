@@ -8,10 +8,11 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from reojax._internal.arrays import Array
+from reojax.drawing.colours import GREY, INK, PALE
 from reojax.mechanics.holonomy import rotation_history
 from reojax.path import polygon
 from reojax.planning import FreePaths, Plan
-from reojax.plot._style import GREY, INK, PALE, dress
+from reojax.plot._style import dress
 from reojax.plot.history import draw_joints
 from reojax.robot import Robot
 

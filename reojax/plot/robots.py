@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import as_numbers
-from reojax.plot._solids import Faces, joint_faces, link_faces
-from reojax.plot._style import BASE, INK, LINKS
-from reojax.plot._view import View, check_view, shade
+from reojax.drawing.colours import BASE, INK, LINKS
+from reojax.drawing.solids import Faces, joint_faces, link_faces
+from reojax.drawing.view import View, check_view
+from reojax.plot._light import shade
 from reojax.robot import Robot
 
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reojax._internal.display_units import display_unit
-from reojax.plot._style import GREY, INK, PALE
+from reojax.drawing.colours import GREY, INK, PALE
 
 if TYPE_CHECKING:
     from reojax.sweeps import Sweep

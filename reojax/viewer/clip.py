@@ -95,7 +95,7 @@ def measured_and_simulated(robot: Robot, comparison: Comparison) -> tuple[Clip, 
     rotation = c.measured_rotation if turned.any() else c.simulated_rotation
     measured = _Samples(c.time[seen] - c.time[0], theta[seen], rotation[seen])
     simulated = _Samples(c.time - c.time[0], c.simulated_theta, c.simulated_rotation)
-    clips = [_sampled(robot, part, "motion") for part in (simulated, measured)]
+    clips = [_sampled(robot, part, "motion", start=0.0) for part in (simulated, measured)]
     return clips[0], clips[1]._replace(notes=(*clips[1].notes, *notes))
 
 
@@ -127,8 +127,8 @@ def _along(robot: Robot, path: Path, entry: str, certified: bool | None) -> Clip
     return _thin(clip, "corners", len(corners))
 
 
-def _sampled(robot: Robot, motion: Any, entry: str) -> Clip:
-    """A motion by time."""
+def _sampled(robot: Robot, motion: Any, entry: str, start: float | None = None) -> Clip:
+    """A motion by time; the clock is zero at `start`, default its first sample."""
     time = checks.numbers(f"{entry}.time", np.asarray(motion.time), (-1,))
     theta = checks.numbers(f"{entry}.theta", np.asarray(motion.theta), (-1, -1))
     _check_joints(robot, theta.shape[1], entry)
@@ -141,7 +141,8 @@ def _sampled(robot: Robot, motion: Any, entry: str) -> Clip:
     if whole is not None:
         _check_robot(robot, whole, entry)
     travel = float(np.abs(np.diff(theta, axis=0)).sum())
-    return _thin(Clip(time - time[0], theta, rotation, True, np.zeros(0), travel, motion=whole), "samples", len(time))
+    start = time[0] if start is None else start
+    return _thin(Clip(time - start, theta, rotation, True, np.zeros(0), travel, motion=whole), "samples", len(time))
 
 
 def _thin(clip: Clip, what: str, count: int) -> Clip:
@@ -157,8 +158,10 @@ def _thin(clip: Clip, what: str, count: int) -> Clip:
 
 def _check_joints(robot: Robot, joints: int, entry: str) -> None:
     if joints != robot.joints:
-        raise ValueError(f"`{entry}` moves {joints} joints, so it is a motion of another robot than {robot.name!r}, "
-                         f"which has {robot.joints}: {checks.shorten(', '.join(robot.joint_names))[1:-1]}.")
+        raise ValueError(
+            f"`{entry}` moves {joints} joints, so it is a motion of another robot than {robot.name!r}, "
+            f"which has {robot.joints}: {checks.shorten(', '.join(robot.joint_names))[1:-1]}."
+        )
 
 
 def _check_robot(robot: Robot, motion: Motion, entry: str) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from reojax import so3
+from reojax._internal.arrays import Array
 from reojax.mechanics.attitude import tilt_and_roll
 from reojax.viewer.clip import Clip
 
@@ -56,11 +57,15 @@ def _of_certificate(clip: Clip) -> dict[str, str]:
         return {}
     certificate = clip.certificate
     return {
-        "certificate: momentum left": f"{float(certificate.momentum):.0e} of what links exchange",
-        "certificate: R\u1d40R \u2212 1": f"{float(certificate.orthogonality):.0e}",
-        "certificate: step halved": f"{float(certificate.halving):.0e} rad",
-        "certificate: end of history": f"{float(certificate.endpoint):.0e} rad",
+        "certificate: momentum left": f"{_small(certificate.momentum)} of what links exchange",
+        "certificate: R\u1d40R \u2212 1": _small(certificate.orthogonality),
+        "certificate: step halved": f"{_small(certificate.halving)} rad",
+        "certificate: end of history": f"{_small(certificate.endpoint)} rad",
     }
+
+
+def _small(value: Array) -> str:
+    return f"{float(value):.0e}" if value > 1e-16 else "below 1e-16"
 
 
 def _fixed(value: float, digits: int) -> str:

@@ -23,19 +23,20 @@ def robot_data(robot: Robot) -> dict[str, Any]:
     """Tree, masses and shapes of a robot: its capsules, or solids of its inertia for links that have none."""
     scale = size(robot)
     solids, pins = link_faces(robot), joint_faces(robot)
+    masses = np.asarray(robot.mass, float)
     with_capsules = set(robot.capsule_link)
     axis = np.asarray(robot.axis, float)
     axis = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
     links = [
         {
             "name": shorten(name),
-            "mass": float(robot.mass[k]),
+            "mass": float(masses[k]),
             "com": _list(robot.com[k], 12),
             "colour": link_colour(k),
             "faces": [] if k in with_capsules else _mesh(solids[k], scale),
             "pin": [] if k == 0 else _mesh(pins[k - 1], scale),
             "capsules": [
-                [_list(start, 9), _list(end, 9), float(radius)]
+                [_list(start, 9), _list(end, 9), float(np.asarray(radius))]
                 for link, start, end, radius in robot.capsules
                 if link == k
             ],
@@ -43,7 +44,12 @@ def robot_data(robot: Robot) -> dict[str, Any]:
         for k, name in enumerate(robot.link_names)
     ]
     joints = [
-        {"name": shorten(name), "parent": robot.parent[k], "axis": _list(axis[k], 15), "anchor": _list(robot.anchor[k], 12)}
+        {
+            "name": shorten(name),
+            "parent": robot.parent[k],
+            "axis": _list(axis[k], 15),
+            "anchor": _list(robot.anchor[k], 12),
+        }
         for k, name in enumerate(robot.joint_names)
     ]
     return {"name": shorten(robot.name), "links": links, "joints": joints, "ink": INK, "size": scale}

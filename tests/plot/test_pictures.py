@@ -10,8 +10,8 @@ from PIL import Image
 
 import reojax
 from reojax import plot, robots
+from reojax.drawing import solids
 from reojax.mechanics.kinematics import kinematics
-from reojax.plot import _solids
 from reojax.plot.robots import faces_at_pose, poses
 from reojax.robots.random import random_robot
 
@@ -41,7 +41,7 @@ def test_poses_are_those_of_the_mechanics():
 
 def test_a_middle_link_is_its_cylinder():
     """A uniform cylinder is drawn as itself: 64 mm long, 25.6 mm in radius, hanging from its joint."""
-    low, high = extent(_solids.link_faces(PROTOTYPE)[1])
+    low, high = extent(solids.link_faces(PROTOTYPE)[1])
     np.testing.assert_allclose([low[2], high[2]], [-0.064, 0], atol=1e-12)
     np.testing.assert_allclose(np.abs([low[:2], high[:2]]), 0.0256, rtol=0.02)
 
@@ -49,20 +49,20 @@ def test_a_middle_link_is_its_cylinder():
 def test_an_l_shaped_end_link_looks_like_one():
     """Shank along z up to the foot, foot out to the insert, nothing between: as the prototype was built."""
     chosen = robots.prototype.__globals__["Chosen"]()
-    points = _solids.link_faces(PROTOTYPE)[0].reshape(-1, 3)
+    points = solids.link_faces(PROTOTYPE)[0].reshape(-1, 3)
     along_foot = points @ chosen.foot_direction
     assert along_foot.max() == pytest.approx(chosen.foot_length, rel=0.05)
     assert points[:, 2].max() == pytest.approx(chosen.shank_length, rel=0.2)
     low = points[points[:, 2] < 0.6 * chosen.shank_length]
     assert len(low)
     assert np.abs(low @ chosen.foot_direction).max() < 2 * chosen.rod_radius
-    mirrored = _solids.link_faces(PROTOTYPE)[3].reshape(-1, 3) * [-1, 1, -1]
+    mirrored = solids.link_faces(PROTOTYPE)[3].reshape(-1, 3) * [-1, 1, -1]
     np.testing.assert_allclose(np.sort(mirrored, axis=0), np.sort(points, axis=0), atol=1e-12)
 
 
 def test_straight_rods_stay_straight():
     """A rod that sticks out at a right angle from its joint is no L."""
-    for link, faces in enumerate(_solids.link_faces(robots.planar(3))):
+    for link, faces in enumerate(solids.link_faces(robots.planar(3))):
         low, high = extent(faces)
         np.testing.assert_allclose([low[0], high[0]], [0, 1], atol=2e-3, err_msg=str(link))
         assert np.abs([low[1:], high[1:]]).max() < 0.1
@@ -71,7 +71,7 @@ def test_straight_rods_stay_straight():
 @pytest.mark.parametrize("robot", [random_robot(s, 4, branched=True) for s in (1, 2)] + [robots.two_cylinder_cat(0.25)])
 def test_faces_are_closed_and_face_outwards(robot):
     """By Gauss the faces of one link enclose a positive volume, and their areas balance."""
-    for faces in _solids.link_faces(robot) + _solids.joint_faces(robot):
+    for faces in solids.link_faces(robot) + solids.joint_faces(robot):
         area = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1]) / 2
         np.testing.assert_allclose(area.sum(0), 0, atol=1e-12)
         assert np.einsum("fi,fi", faces.mean(1), area) > 0
@@ -81,8 +81,8 @@ def test_links_reach_their_joints():
     """No gap: on every link there is a point close to each of its joints."""
     for seed in range(6):
         robot = random_robot(seed, 4, branched=True)
-        thick = 0.06 * _solids.size(robot)
-        for link, faces in enumerate(_solids.link_faces(robot)):
+        thick = 0.06 * solids.size(robot)
+        for link, faces in enumerate(solids.link_faces(robot)):
             points = faces.reshape(-1, 3)
             low, high = points.min(0) - thick, points.max(0) + thick
             joints = [np.zeros(3)] * (link > 0) + [robot.anchor[k] for k, p in enumerate(robot.parent) if p == link]

@@ -184,7 +184,7 @@ window.reojax = {
   speed: () => RATES[rate],
   // Move to sample i of a clip; its base's rotation and its links' frames, about the robot's centre of mass.
   poses(i, clip = 0) {
-    if (i !== undefined) go(data.clips[clip].clock[i]);
+    if (Number.isInteger(i)) go(data.clips[clip].clock[i]);
     const body = stage.bodies[clip];
     body.root.updateMatrixWorld(true);
     const rows = (matrix) => [0, 1, 2].map((r) => [0, 1, 2].map((c) => matrix.elements[4 * c + r]));

@@ -43,7 +43,7 @@ function makeStage(canvas, holder) {
   }
   function lookHome() {
     const { w, h } = layout();
-    const fit = (reach * 1.2) / Math.sin((camera.fov * Math.PI) / 360) / Math.min(1, w / h);
+    const fit = (reach * (w < h ? 1.28 : 1.2)) / Math.sin((camera.fov * Math.PI) / 360) / Math.min(1, w / h);
     camera.position.set(...eye).multiplyScalar(fit);
     controls.target.set(0, 0, 0);
     controls.update();
@@ -156,7 +156,9 @@ function text(letter, colour, size) {
   pen.strokeText(letter, 48, 50);
   pen.fillStyle = colour;
   pen.fillText(letter, 48, 50);
-  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(canvas), depthTest: false }));
+  const map = new THREE.CanvasTexture(canvas);
+  map.colorSpace = "srgb";
+  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, depthTest: false }));
   sprite.scale.setScalar(size);
   sprite.renderOrder = 10;
   return sprite;
@@ -206,7 +208,8 @@ function makeBody(robot, clip) {
     const frame = new THREE.Group();
     frame.matrixAutoUpdate = false;
     const skin = clip.ghost
-      ? new THREE.MeshStandardMaterial({ color: GHOST, transparent: true, opacity: 0.3, depthWrite: false, roughness: 0.8 })
+      ? new THREE.MeshStandardMaterial({ color: GHOST, transparent: true, opacity: 0.3, depthWrite: false, roughness: 0.8,
+          polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 })
       : new THREE.MeshStandardMaterial({ color: link.colour, roughness: 0.55, metalness: 0.05 });
     link.capsules.forEach(([start, end, radius]) => frame.add(capsule(start, end, radius, skin)));
     if (link.faces.length) frame.add(new THREE.Mesh(quads(link.faces), skin));
@@ -225,19 +228,20 @@ function makeBody(robot, clip) {
   }
   // How far the robot reaches from its centre of mass in any sampled posture.
   let reach = 0;
+  const corner = new THREE.Vector3();
   const every = Math.max(1, Math.floor(clip.theta.length / 40));
   for (let i = 0; i < clip.theta.length; i += every) {
     linkMatrices(robot, clip.theta[i]).forEach((matrix, k) => {
       frames[k].children.forEach((mesh) => {
         mesh.updateMatrix();
-        mesh.geometry.computeBoundingSphere();
-        const sphere = mesh.geometry.boundingSphere;
-        const centre = sphere.center.clone().applyMatrix4(mesh.matrix).applyMatrix4(matrix);
-        reach = Math.max(reach, centre.length() + sphere.radius);
+        const points = mesh.geometry.getAttribute("position");
+        for (let at = 0; at < points.count; at += 3) {
+          reach = Math.max(reach, corner.fromBufferAttribute(points, at).applyMatrix4(mesh.matrix).applyMatrix4(matrix).length());
+        }
       });
     });
   }
-  return { root, frames, pose, reach: reach || robot.size };
+  return { root, frames, pose, reach: reach * 1.02 || robot.size };
 }
 
 function capsule(start, end, radius, skin) {
@@ -257,7 +261,9 @@ function quads(corners) {
   }
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
-  return THREE.toCreasedNormals(geometry, Math.PI / 5);
+  geometry.computeBoundingSphere();
+  const unit = 1000 / Math.max(geometry.boundingSphere.radius, 1e-12); // what follows takes points within 0.01 for one
+  return THREE.toCreasedNormals(geometry.scale(unit, unit, unit), Math.PI / 5).scale(1 / unit, 1 / unit, 1 / unit);
 }
 
 // Of each body axis, the way its tip goes on the sphere: pale all along, strong as far as it has come.
