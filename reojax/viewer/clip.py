@@ -82,7 +82,7 @@ def measured_and_simulated(robot: Robot, comparison: Comparison) -> tuple[Clip, 
     """Simulated motion of a comparison, and the measured one where something was seen; else it goes as simulated."""
     c = comparison
     theta = np.where(np.isfinite(c.measured_theta), c.measured_theta, c.simulated_theta)
-    turned = np.isfinite(c.measured_rotation).all(axis=(1, 2))
+    turned = np.asarray(np.isfinite(c.measured_rotation).all(axis=(1, 2)))
     angled = np.isfinite(c.measured_theta).all(axis=1)
     seen = turned if turned.any() else angled
     if not seen.any():

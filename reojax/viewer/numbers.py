@@ -19,7 +19,7 @@ def rows(clip: Clip, target: Float[np.ndarray, "3 3"] | None) -> dict[str, str]:
     vector = np.rad2deg(np.asarray(so3.log(end), float))
     told = {
         "net rotation vector": f"({', '.join(_fixed(x, 2) for x in vector)})°",
-        "net rotation angle": f"{_fixed(np.linalg.norm(vector), 3)}°",
+        "net rotation angle": f"{_fixed(float(np.linalg.norm(vector)), 3)}°",
     }
     if clip.rotation[:, 2, 2].min() > -0.999:  # where z is never turned upside down, the roll can be counted on
         roll = tilt_and_roll(clip.rotation)[:, 2]
