@@ -22,6 +22,8 @@ from reojax.mechanics.dynamics import (
 from reojax.mechanics.holonomy import net_rotation, rotation_history
 from reojax.mechanics.kinematics import LinkPoses, centre_of_mass, link_poses
 from reojax.mechanics.momentum import MomentumMatrices, angular_momentum, connection, momentum_matrices
+from reojax.models.json_file import save_robot
+from reojax.models.load import load_robot
 from reojax.motion.fastest import Fastest, fastest_loop, free_law, overlap
 from reojax.motion.least_time import LeastTime, minimum_stretch, minimum_time
 from reojax.motion.motor import RE_MAX_17, Motor, no_load_speed, stall_torque, with_motors
@@ -82,6 +84,7 @@ __all__ = [
     "LeastTime",
     "link_poses",
     "LinkPoses",
+    "load_robot",
     "make_capture",
     "make_robot",
     "manoeuvre_a",
@@ -118,6 +121,7 @@ __all__ = [
     "rotation_history",
     "Sampled",
     "simulate",
+    "save_robot",
     "SIX_BODY",
     "so3",
     "stall_torque",

@@ -9,6 +9,7 @@ import numpy as np
 from reojax._internal.capsule_checks import check_capsules, check_pairs, default_pairs
 from reojax._internal.checks import index_of, numbers, refuse, shorten
 from reojax._internal.definiteness import check_energy
+from reojax._internal.inertias import NOISE, breaks_triangle
 
 _TOLERANCE = 1e-6
 """Relative rounding allowed in unit lengths, symmetry and the triangle rule (float32 data pass)."""
@@ -60,8 +61,8 @@ def _inertias(value: Any, names: Sequence[str]) -> np.ndarray:
     for i, (matrix, name) in enumerate(zip(inertia, names, strict=True)):
         if np.abs(matrix - matrix.T).max() > _TOLERANCE * np.abs(matrix).max():
             raise ValueError(f"inertia[{i}] ({name}) is {matrix.tolist()}; it must be symmetric.")
-        small, middle, large = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
-        if small < -_TOLERANCE * large or large < 0 or large > (small + middle) * (1 + _TOLERANCE):
+        small, middle, large = moments = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
+        if breaks_triangle(moments, NOISE * np.abs(inertia).max()):
             raise ValueError(
                 f"inertia[{i}] ({name}) has principal moments {small:.6g}, {middle:.6g}, {large:.6g} kg m^2; of "
                 "a rigid body's none is negative, and none is larger than the sum of the other two."
