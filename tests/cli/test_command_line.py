@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 import reojax
 from reojax import plot, robots, session, so3
 from reojax._internal import files
-from reojax.cli import main, simulate
+from reojax.cli import COMMANDS, main, simulate
 from reojax.mechanics.attitude import tilt_and_roll
 
 
@@ -76,10 +76,17 @@ def test_version():
     assert done.stdout.startswith("reojax ")
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["simulate", "--help"]])
-def test_help(capsys, arguments):
-    assert main(arguments) == 0
-    assert "simulate" in capsys.readouterr().out
+def test_help_lists_every_command_with_what_it_does(capsys):
+    assert main(["--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    for name, module in COMMANDS.items():
+        assert f"{name} {' '.join(module.__doc__.splitlines()[0].split())}" in text
+
+
+@pytest.mark.parametrize("command", sorted(COMMANDS))
+def test_every_command_has_help_of_its_own(capsys, command):
+    assert main([command, "--help"]) == 0
+    assert f"usage: reojax {command} " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

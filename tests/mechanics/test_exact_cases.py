@@ -33,7 +33,7 @@ def along(robot, *waypoints, edges: int = 4) -> np.ndarray:
     """Net rotation; the last corner is repeated so that most cases share one compiled program."""
     waypoints = np.array(waypoints, float)
     still = np.repeat(waypoints[-1:], edges + 1 - len(waypoints), axis=0)
-    return np.asarray(net_rotation(robot, reojax.polygon(np.concatenate([waypoints, still])), steps=STEPS))
+    return np.array(net_rotation(robot, reojax.polygon(np.concatenate([waypoints, still])), steps=STEPS))
 
 
 # --- 1. one body and a wheel -----------------------------------------------------------------------------

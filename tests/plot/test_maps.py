@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
+from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
 
 import reojax
@@ -29,7 +30,7 @@ def test_a_map_is_filled_has_lines_and_a_bar_with_the_unit():
 def test_signed_maps_are_white_at_zero():
     axes = Figure().add_subplot()
     plot.draw_map(axes, X, Y, Z - Z.max() / 4, label=None, diverging=True)
-    filled = axes.collections[-2]
+    (filled,) = (drawn for drawn in axes.collections if isinstance(drawn, ContourSet) and drawn.filled)
     np.testing.assert_allclose(filled.to_rgba(0.0)[:3], 0.97, atol=0.03)
 
 

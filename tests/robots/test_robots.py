@@ -396,8 +396,13 @@ def test_a_ratio_that_no_cylinder_has(ratio):
 
 
 @pytest.mark.parametrize("name", robots.NAMES)
-def test_every_name_is_a_robot_of_its_name(name):
-    assert robots.by_name(name).name == name
+def test_every_name_is_a_robot_that_can_be(name):
+    """Of its name; it has inertia about every axis, and its rest posture is within its limits."""
+    robot = robots.by_name(name)
+    assert robot.name == name
+    assert ((robot.lower <= 0) & (robot.upper >= 0)).all()
+    locked, _ = reojax.momentum_matrices(robot, np.full(robot.joints, 0.1))
+    assert np.linalg.eigvalsh(locked)[0] > 0
 
 
 def test_an_unknown_name_lists_the_known_ones():
