@@ -2,9 +2,12 @@
 
 import ctypes
 import os
+import re
 import sys
+import warnings
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import jax
 import jaxlib
@@ -33,6 +36,23 @@ def start() -> None:
     if os.access(folder, os.W_OK | os.X_OK):
         jax.config.update("jax_compilation_cache_dir", str(folder))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+        _forget_damaged(folder)
+
+
+def _forget_damaged(folder: Path) -> None:
+    """Let entries of the cache that cannot be read be made anew, without a word, instead of a warning at every run."""
+    show = warnings.showwarning
+
+    def told(message: Warning | str, *rest: Any, **more: Any) -> None:
+        found = re.match(r"Error reading persistent compilation cache entry for '(\w+)'", str(message))
+        if found is None:
+            return show(message, *rest, **more)
+        for file in folder.glob(f"{found[1]}-*"):
+            file.unlink(missing_ok=True)
+        return None
+
+    warnings.showwarning = told
+    warnings.filterwarnings("always", "Error reading persistent compilation cache entry", UserWarning)
 
 
 def hold_memory() -> None:

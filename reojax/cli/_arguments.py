@@ -2,8 +2,9 @@
 
 import argparse
 import math
+import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 LARGEST_ANGLE = 36000.0
 """Largest amplitude at the command line [deg]: a hundred turns."""
@@ -21,6 +22,10 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise `BadInput`, led by the command's name."""
         raise BadInput(f"{self.prog}: {message}")
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        """Print help; argparse's own lets errors of the stream pass."""
+        (file or sys.stderr).write(message)
 
 
 def degrees(text: str) -> float:

@@ -1,6 +1,5 @@
 """Computing what a store does not have yet, alone or with other processes."""
 
-import logging
 import os
 import random
 from collections.abc import Callable, Iterator, Sequence
@@ -15,8 +14,6 @@ from reojax.sweeps.engine import run
 from reojax.sweeps.outputs import Outputs
 from reojax.sweeps.progress import Progress
 from reojax.sweeps.store import Store
-
-log = logging.getLogger("reojax")
 
 
 def complete(
@@ -53,9 +50,9 @@ def complete(
                     store.put(chunk)
                     found[chunk.number] = chunk.bad
                     shown.add(chunk.number)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
             where = str(store.folder)
-            log.warning("stopped; finished chunks are in %r, and the same sweep goes on from there", where)
+            interrupt.add_note(f"finished chunks are in {where!r}, and the same sweep goes on from there")
             raise
     if several:
         from jax.experimental import multihost_utils

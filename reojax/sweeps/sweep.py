@@ -110,8 +110,8 @@ def run_sweep(
                 for chunk in run(function, program, outputs, mine):
                     memory.put(chunk)
                     shown.add(chunk.number)
-        except KeyboardInterrupt:
-            log.warning("stopped; without a `store` nothing is kept")
+        except KeyboardInterrupt as interrupt:
+            interrupt.add_note("without a store nothing is kept")
             raise
         failures, load = memory.failures, lambda: memory.arrays(designs)
     else:

@@ -2,8 +2,11 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import jax.numpy as jnp
@@ -17,6 +20,8 @@ from reojax import plot, robots, session, so3
 from reojax._internal import files
 from reojax.cli import COMMANDS, main, simulate
 from reojax.mechanics.attitude import tilt_and_roll
+
+SHIPPED = Path(__file__).parents[2] / "docs" / "synthetic_capture.csv"
 
 
 @pytest.fixture(autouse=True)
@@ -155,6 +160,48 @@ sys.exit(main(["simulate"]))
     assert child.wait() == 0
 
 
+def shell(command: str, **environment: str) -> subprocess.CompletedProcess:
+    """Run a command of the shell in which `reojax` is this one."""
+    script = f'reojax() {{ exec "{sys.executable}" -m reojax "$@"; }}; {command}'
+    return subprocess.run(
+        ["sh", "-c", script], capture_output=True, text=True, check=False, env={**os.environ, **environment}
+    )
+
+
+@pytest.mark.parametrize("buffered", ["", "1"])
+def test_a_full_or_closed_stdout_is_one_line(buffered):
+    for command, status, complaint in (
+        ("reojax --help >/dev/full", 1, "reojax: cannot print the result: No space left on device.\n"),
+        ("reojax --version >/dev/full", 1, "reojax: cannot print the result: No space left on device.\n"),
+        ("reojax --help >&-", 2, "reojax: stdout is closed, so that no result can be printed.\n"),
+        ("reojax turn 2>&-", 2, ""),
+        ("reojax turn 2>/dev/full", 2, ""),
+    ):
+        done = shell(command, PYTHONUNBUFFERED=buffered)
+        assert (done.returncode, done.stdout, done.stderr) == (status, "", complaint)
+
+
+def test_a_terminal_without_degrees_and_other_letters():
+    done = shell("reojax simulate --robot 'Kätzchen °'", PYTHONIOENCODING="ascii", PYTHONUTF8="0", LC_ALL="C")
+    assert done.returncode == 2
+    assert done.stderr.startswith("reojax simulate: there is no robot named")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("moment", [0.02, 0.06, 0.15, 0.3, 0.5, 0.8, 1.2, 2.0])
+def test_ctrl_c_at_any_moment_is_one_line_and_status_130(moment):
+    """Also while modules are imported and programs compiled; before Python reads the command it is Python's own."""
+    code = "import sys, reojax.__main__ as entry; print('here', flush=True); sys.argv[0] = 'reojax'; entry.main()"
+    command = [sys.executable, "-c", code, "compare", str(SHIPPED), "--calibrate", "end_inertia"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    process.stdout.readline()
+    time.sleep(moment)
+    process.send_signal(signal.SIGINT)
+    printed, complaint = process.communicate()
+    assert (process.returncode, complaint, printed) == (130, "reojax: interrupted\n", "")
+
+
 def test_files_are_whole_or_absent(tmp_path):
     """A failure half way leaves the old file and nothing else; a link stays a link."""
     old, link = tmp_path / "old.json", tmp_path / "link.json"
@@ -180,14 +227,34 @@ def test_files_are_whole_or_absent(tmp_path):
         ("file/a", "there is no folder"),
         ("/dev/null", "not a regular file"),
         ("x" * 300, "File name too long"),
+        ("x" * 10**6, "File name too long"),
+        ("loop", "Too many levels of symbolic links"),
+        ("loop/a", "Too many levels of symbolic links"),
+        (1, "it is a int, not the path of a file"),
+        ("a\0", "no path has a zero byte"),
     ],
+    ids=str,
 )
 def test_paths_that_cannot_be_written_are_refused(monkeypatch, tmp_path, path, message):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").touch()
+    (tmp_path / "loop").symlink_to("pool")
+    (tmp_path / "pool").symlink_to("loop")
     with pytest.raises(ValueError, match=f"cannot write .*{message}"):
         files.write_json(path, [])
-    assert os.listdir(tmp_path) == ["file"]
+    assert sorted(os.listdir(tmp_path)) == ["file", "loop", "pool"]
+
+
+def test_permissions_stay(tmp_path):
+    for mode in (0o600, 0o640, 0o755):
+        (tmp_path / "a").touch()
+        (tmp_path / "a").chmod(mode)
+        files.write_json(tmp_path / "a", [])
+        assert (tmp_path / "a").stat().st_mode & 0o777 == mode
+    before = os.umask(0o027)
+    files.write_json(tmp_path / "new", [])
+    os.umask(before)
+    assert (tmp_path / "new").stat().st_mode & 0o777 == 0o640
 
 
 def test_a_picture_that_fails_leaves_nothing(monkeypatch, tmp_path):
@@ -261,6 +328,21 @@ def _started(monkeypatch, folder, cache, given) -> dict:
         monkeypatch.setenv("REOJAX_CACHE", cache)
     session.start()
     return told
+
+
+def test_a_damaged_entry_of_the_cache_is_made_anew(tmp_path):
+    """Without a word, and the next run finds it whole."""
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "JAX_COMPILATION_CACHE_DIR": "", "REOJAX_CACHE": "1"}
+    code = "from reojax import session; session.start(); import jax; print(jax.jit(lambda x: 2 * x)(3.0))"
+    folder = tmp_path / "reojax" / "jax"
+    for damage in (None, b"", b"damaged", None):
+        for file in folder.glob("*-cache"):
+            if damage is not None:
+                file.write_bytes(damage)
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        assert (done.stdout, done.stderr) == ("6.0\n", "")
+        assert all(file.stat().st_size > 100 for file in folder.glob("jit_*-cache"))
+    assert list(folder.glob("jit_*-cache"))
 
 
 def test_the_cache_forgets_its_oldest_programs(tmp_path):
