@@ -11,9 +11,12 @@ from reojax._internal.arrays import Array
 
 def solve_symmetric3(matrix: Float[Array, "3 3"], right: Float[Array, "3 k"]) -> Float[Array, "3 k"]:
     """Solve `matrix @ x = right` for a symmetric positive definite matrix by its adjugate (Cramer)."""
-    x, y, z = matrix
+    size = jax.lax.stop_gradient(
+        jnp.trace(matrix)
+    )  # divided out, or else the determinant may leave the range of floats
+    x, y, z = matrix / size
     adjugate = jnp.stack([jnp.cross(y, z), jnp.cross(z, x), jnp.cross(x, y)])
-    return adjugate @ right / jnp.dot(x, adjugate[0])
+    return jnp.matmul(adjugate, right / size, precision="highest") / jnp.dot(x, adjugate[0], precision="highest")
 
 
 def solve_positive(matrix: Float[Array, "n n"], right: Float[Array, "n ..."]) -> Float[Array, "n ..."]:

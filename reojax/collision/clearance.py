@@ -14,7 +14,7 @@ from reojax._internal.arrays import Array
 from reojax.collision.chains import Geometry, Structure, geometry_of, structure_of
 from reojax.collision.placement import pair_ends
 from reojax.collision.segments import segment_distance
-from reojax.mechanics.kinematics import check_motion
+from reojax.mechanics.input_checks import check_motion
 from reojax.robot import Robot
 
 

@@ -22,7 +22,9 @@ from jaxtyping import Float
 from reojax import so3
 from reojax._internal.arrays import Array, common_float
 from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation, rotation_history
+from reojax.mechanics.input_checks import check_path, check_robot
 from reojax.mechanics.kinematics import kinematics
+from reojax.mechanics.own_units import in_own_units, without_names
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -111,6 +113,7 @@ def momentum_residual(robot: Robot, path: Path, rotations: Float[Array, "m 3 3"]
     Raises:
         ValueError: if `rotations` does not fit the path, or has too few samples per edge.
     """
+    check_path(check_robot(robot), path)
     edges = path.edges
     shape = jnp.shape(rotations)
     samples = (shape[0] - 1) // edges if edges and shape else 0
@@ -121,14 +124,15 @@ def momentum_residual(robot: Robot, path: Path, rotations: Float[Array, "m 3 3"]
         )
     if edges and samples < WINDOW - 1:
         raise ValueError(f"`rotations` has {samples} samples per edge; differences need {WINDOW - 1} or more.")
-    return _residual(robot, path.waypoints, rotations, samples)
+    return _residual(without_names(robot), path.waypoints, rotations, samples)
 
 
 @partial(jax.jit, static_argnums=3)
 def _residual(robot: Robot, waypoints: Array, rotations: Array, samples: int) -> jax.Array:
     dtype = common_float(robot, waypoints, rotations)
     robot, points, turned = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), (robot, waypoints, rotations))
-    if points.shape[0] == 1:
+    robot = in_own_units(robot)  # the result is relative
+    if points.shape[0] == 1 or not robot.joints:
         return jnp.zeros((), dtype)
     first = turned[:-1].reshape(-1, samples, 3, 3)
     along = jnp.concatenate([first, turned[samples::samples, None]], axis=1)
@@ -139,7 +143,8 @@ def _residual(robot: Robot, waypoints: Array, rotations: Array, samples: int) ->
 
     net, exchanged = jax.lax.map(edge, (points[:-1], points[1:], along))
     scale = exchanged.max()
-    return jnp.where(scale > 0, net.max() / jnp.where(scale > 0, scale, 1), 0)
+    still = scale == 0  # and not where it is NaN: then so is the result
+    return jnp.where(still, 0, net.max() / jnp.where(still, 1, scale))
 
 
 def edge_momentum(

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array, is_concrete
 from reojax.mechanics.curvature import curvature_terms
-from reojax.mechanics.kinematics import check_motion
+from reojax.mechanics.input_checks import check_motion
 from reojax.robot import Robot
 
 if TYPE_CHECKING:

@@ -7,7 +7,9 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from reojax._internal.arrays import Array
-from reojax.mechanics.momentum import connection
+from reojax.mechanics.input_checks import check_motion
+from reojax.mechanics.kinematics import kinematics
+from reojax.mechanics.momentum import connection_of_pose
 from reojax.robot import Robot
 
 
@@ -35,15 +37,17 @@ def curvature(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "3 j j"]:
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
-    return curvature_terms(robot, theta)[2]
+    return curvature_terms(*check_motion(robot, theta=theta))[2]
 
 
 def curvature_terms(
     robot: Robot, theta: Float[Array, " j"]
 ) -> tuple[Float[Array, "3 j"], Float[Array, "3 j j"], Float[Array, "3 j j"]]:
-    """The connection, its slope `[:, k, i] = d_i Gamma_k`, and its curvature at a shape."""
-    gamma = connection(robot, theta)
-    theta = jnp.asarray(theta, gamma.dtype)
-    slope = jax.jacfwd(connection, argnums=1)(robot, theta)
-    bracket = jnp.cross(gamma[:, :, None], gamma[:, None, :], axis=0)
+    """The connection, its slope `[:, k, i] = d_i Gamma_k`, and its curvature; arrays checked and of one dtype."""
+
+    def gamma_of(theta: Array) -> Array:
+        return connection_of_pose(robot, kinematics(robot, theta))
+
+    gamma, slope = gamma_of(theta), jax.jacfwd(gamma_of)(theta)
+    bracket = jnp.cross(gamma[:, :, None], gamma[:, None, :], axis=0)  # Gamma_i x Gamma_k
     return gamma, slope, jnp.swapaxes(slope, 1, 2) - slope + bracket

@@ -25,7 +25,8 @@ from jaxtyping import Float
 
 from reojax._internal.arrays import Array
 from reojax._internal.linalg import solve_positive, solve_symmetric3
-from reojax.mechanics.kinematics import Kinematics, check_motion, kinematics, support_mask
+from reojax.mechanics.input_checks import check_motion
+from reojax.mechanics.kinematics import Kinematics, kinematics, support_mask
 from reojax.mechanics.momentum import inertia_in_base_frame, momentum_matrices_of_pose, rotor_spin
 from reojax.robot import Robot
 

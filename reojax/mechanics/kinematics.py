@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from reojax._internal import checks
-from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
+from reojax._internal.arrays import Array
+from reojax.mechanics.input_checks import check_motion
 from reojax.robot import Robot
 from reojax.so3 import hat
 
@@ -64,22 +64,6 @@ def centre_of_mass(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "3"]
     return _mass_shares(robot) @ (pose.position + jnp.einsum("iab,ib->ia", pose.rotation, robot.com))
 
 
-def check_motion(robot: Robot, **motion: Any) -> Any:
-    """Return the robot and the motion's vectors as arrays of one dtype, or raise a `ValueError`."""
-    checks.instance("robot", robot, Robot, "`make_robot` makes")
-    for entry, value in motion.items():
-        expected = (3,) if entry in ("omega", "momentum") else (robot.joints,)
-        vector = motion[entry] = as_numbers(entry, value)
-        if vector.shape != expected:
-            robot_size = f"{robot.name!r} ({robot.joints} joints)"
-            raise ValueError(f"`{entry}` has shape {vector.shape}; for {robot_size} it must be {expected}.")
-        if is_concrete(vector) and not np.isfinite(vector).all():
-            raise ValueError(f"`{entry}` is {np.asarray(vector).tolist()}; it must be finite.")
-    everything = (robot, *motion.values())
-    dtype = common_float(everything)
-    return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), everything)
-
-
 def joint_rotation(axis: Float[Array, "3"], angle: Float[Array, ""]) -> Float[Array, "3 3"]:
     """Rotation by `angle` [rad] about the unit vector `axis` (Rodrigues)."""
     c, s = jnp.cos(angle), jnp.sin(angle)
@@ -122,7 +106,9 @@ def kinematics(robot: Robot, theta: Float[Array, " j"]) -> Kinematics:
 
 def unit_axes(robot: Robot) -> Float[Array, "j 3"]:
     """Joint axes of unit length: only their direction counts."""
-    return robot.axis / jnp.sqrt((robot.axis * robot.axis).sum(1, keepdims=True))
+    size = jax.lax.stop_gradient(jnp.abs(robot.axis).max(1, keepdims=True))  # so that squares stay in range
+    axis = robot.axis / size
+    return axis / jnp.sqrt((axis * axis).sum(1, keepdims=True))
 
 
 def _mass_shares(robot: Robot) -> Float[Array, " n"]:

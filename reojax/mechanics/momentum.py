@@ -4,12 +4,12 @@ With zero momentum, angular velocity `omega` of the base and joint rates `theta_
 *local connection* `A^-1 B`, which depends on the shape `theta` alone. This module is the definition,
 written to be read; `reojax.mechanics._fast` evaluates the same equations quickly and is tested against it.
 
-Notation (thesis 1.5, 2.5), all in the base frame: `rotation[i]`, `centre[i]` are link i's orientation
-and its centre of mass measured from the centre of mass of the whole robot; `turn[i]` (3, j) and
-`shift[i]` (3, j) are its angular and linear Jacobians, `w_i = omega + turn[i] theta_dot` and
-`v_i = omega x centre[i] + shift[i] theta_dot`. The momentum about the centre of mass is
+Notation (thesis 1.5, 2.5), all in the base frame: `R_i`, `c_i` are link i's orientation and its centre of
+mass measured from the centre of mass of the whole robot; `Ja_i` and `Jl_i` (3, j) are its angular and linear
+Jacobians, `w_i = omega + Ja_i theta_dot` and `v_i = omega x c_i + Jl_i theta_dot`. The momentum about the
+centre of mass is
 
-    h = sum_i I_i w_i + m_i centre_i x v_i + sum_k J_k (+-N_k theta_dot_k) e_k  =  A omega - B theta_dot,
+    h = sum_i I_i w_i + m_i c_i x v_i + sum_k J_k (+-N_k theta_dot_k) e_k  =  A omega - B theta_dot,
 
 the last sum over the motors' rotors, which spin about their joints' axes `e_k` relative to the
 links that carry them.
@@ -26,7 +26,8 @@ from jaxtyping import Float
 
 from reojax._internal.arrays import Array
 from reojax._internal.linalg import solve_symmetric3
-from reojax.mechanics.kinematics import Kinematics, check_motion, kinematics
+from reojax.mechanics.input_checks import check_motion
+from reojax.mechanics.kinematics import Kinematics, kinematics
 from reojax.robot import Robot
 from reojax.so3 import hat
 
@@ -61,11 +62,14 @@ def momentum_matrices_of_pose(robot: Robot, pose: Kinematics) -> MomentumMatrice
     """`momentum_matrices` where the poses and Jacobians are known already."""
     inertia = inertia_in_base_frame(robot, pose)
     lever = jax.vmap(hat)(pose.com)
+    # locked inertia: sum of I_i - m_i hat(c_i)^2
     A = (inertia - jnp.einsum("i,iab,ibc->iac", robot.mass, lever, lever)).sum(0)
-    B = -jnp.einsum("iab,ibk->ak", inertia, pose.angular_jacobian) - jnp.einsum(
-        "i,iab,ibk->ak", robot.mass, lever, pose.linear_jacobian
-    )
-    return MomentumMatrices(A, B - pose.axis.T * (robot.rotor_inertia * rotor_spin(robot))[None])
+    # momentum per joint rate while the base rests: sum of I_i Ja_i + m_i c_i x Jl_i ...
+    turning = jnp.einsum("iab,ibk->ak", inertia, pose.angular_jacobian)
+    moving = jnp.einsum("i,iab,ibk->ak", robot.mass, lever, pose.linear_jacobian)
+    # ... and of each joint's rotor, J_k (+-N_k) e_k
+    rotors = pose.axis.T * (robot.rotor_inertia * rotor_spin(robot))[None]
+    return MomentumMatrices(A, -(turning + moving + rotors))
 
 
 def inertia_in_base_frame(robot: Robot, pose: Kinematics) -> Float[Array, "n 3 3"]:
@@ -87,7 +91,13 @@ def connection(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "3 j"]:
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
-    A, B = momentum_matrices(robot, theta)
+    robot, theta = check_motion(robot, theta=theta)
+    return connection_of_pose(robot, kinematics(robot, theta))
+
+
+def connection_of_pose(robot: Robot, pose: Kinematics) -> Float[Array, "3 j"]:
+    """`connection` where the poses and Jacobians are known already."""
+    A, B = momentum_matrices_of_pose(robot, pose)
     return solve_symmetric3(A, B)
 
 
@@ -106,5 +116,5 @@ def angular_momentum(
         ValueError: if an argument has the wrong shape or is not finite.
     """
     robot, theta, theta_dot, omega = check_motion(robot, theta=theta, theta_dot=theta_dot, omega=omega)
-    A, B = momentum_matrices(robot, theta)
+    A, B = momentum_matrices_of_pose(robot, kinematics(robot, theta))
     return A @ omega - B @ theta_dot

@@ -21,6 +21,7 @@ from reojax._internal.arrays import Array
 from reojax.manoeuvres import Layout
 from reojax.mechanics._fast.parameters import Pattern, pattern_of
 from reojax.mechanics.holonomy import DEFAULT_STEPS, _net_rotation, net_rotation
+from reojax.mechanics.own_units import without_names
 from reojax.path import polygon
 from reojax.planning import quaternions
 from reojax.planning.words import AmplitudeBox, fold_angles, last_twist, loop_corners
@@ -47,7 +48,7 @@ def true_rotations(robot: Robot, layout: Layout, amplitudes: Float[np.ndarray, "
     pattern = pattern_of(robot)
 
     def rotations(chunk: np.ndarray) -> np.ndarray:
-        return np.asarray(_net_rotations(robot, chunk, steps, pattern))
+        return np.asarray(_net_rotations(without_names(robot), chunk, steps, pattern))
 
     with ThreadPoolExecutor(2) as pool:
         turned = list(pool.map(rotations, corners.reshape(-1, _CHUNK, *corners.shape[1:])))

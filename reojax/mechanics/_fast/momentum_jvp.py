@@ -38,7 +38,7 @@ def angular_momentum(
     momentum = [body_momentum(m, f, J, *of_link) for m, f, J, of_link in bodies]
     for k in reversed(joints):
         parent = robot.parent[k]
-        rotor = times(mul(rate[k], robot.rotor_spin[k]), robot.axis[k])
+        rotor = times(mul(rate[k], robot.rotor_momentum[k]), robot.axis[k])
         momentum[parent] = onto_parent(E[k], robot.anchor[k], momentum[parent], kept(momentum[k + 1]), rotor)
     p, h = momentum[0]
     return plus(h, times(-1, cross(centre, p)))

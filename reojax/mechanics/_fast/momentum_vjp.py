@@ -82,7 +82,7 @@ def slopes(
         if not all(isinstance(c, int) for c in e):  # or else only one of the three is needed
             turning[k] = materialize(turning[k])
         pull[k] = plus(cross(p_, u), cross(p, w_))
-        rotor = times(mul(rate[k], robot.rotor_spin[k]), e)
+        rotor = times(mul(rate[k], robot.rotor_momentum[k]), e)
         momentum[parent] = onto_parent(E[k], robot.anchor[k], momentum[parent], momentum[link], rotor)
         likewise[parent] = onto_parent(E[k], robot.anchor[k], likewise[parent], likewise[link], (0, 0, 0))
 
@@ -92,7 +92,7 @@ def slopes(
     for k in joints:
         (s, c), e, g = sine_cosine[k], robot.axis[k], turning[k]
         turned = plus(times(s, g), times(sub(c, 1), cross(g, e)))
-        moved = plus(beyond[k], times(robot.rotor_spin[k], virtual[robot.parent[k]][0]))
+        moved = plus(beyond[k], times(robot.rotor_momentum[k], virtual[robot.parent[k]][0]))
         by_axis.append(plus(turned, times(rate[k], moved)))
     motions = list(zip(actual, virtual, strict=True))
     return Slopes(
@@ -102,13 +102,13 @@ def slopes(
             inertia=[_products(w, w_) for (w, _), (w_, _) in motions],
             axis=by_axis,
             anchor=[apply(E[k], pull[k]) for k in joints],
-            rotor_spin=[mul(rate[k], along[k]) for k in joints],
+            rotor_momentum=[mul(rate[k], along[k]) for k in joints],
             parent=robot.parent,
         ),
         theta=[dot(e, g) for e, g in zip(robot.axis, turning, strict=True)],
         rate=[
             add(dot(e, h), mul(spin, a))
-            for e, h, spin, a in zip(robot.axis, beyond, robot.rotor_spin, along, strict=True)
+            for e, h, spin, a in zip(robot.axis, beyond, robot.rotor_momentum, along, strict=True)
         ],
     )
 
@@ -122,7 +122,7 @@ def fusion_groups(robot: RobotScalars) -> Any:
         inertia=[(f"inertia {i}",) * 6 for i in links],
         axis=[(f"axis {k}",) * 3 for k in joints],
         anchor=[(f"anchor {k}",) * 3 for k in joints],
-        rotor_spin=[f"axis {k}" for k in joints],
+        rotor_momentum=[f"axis {k}" for k in joints],
         parent=robot.parent,
     )
     return RobotScalars(**names)

@@ -72,13 +72,13 @@ class RotationProblem(NamedTuple):
 
 def steps_of_path(robot: Robot, pattern: Pattern, points: jax.Array, steps: int) -> Step:
     """Rotation over each of the `steps` steps of each edge, in order."""
-    problem = RotationProblem(steps, robot.parent, known_parameters(robot, pattern))
+    problem = RotationProblem(steps, robot.parent, known_parameters(pattern))
     return _steps_of_path(problem, flatten(parameters(robot)), points)
 
 
 def net_rotation(robot: Robot, pattern: Pattern, points: jax.Array, steps: int) -> jax.Array:
     """Rotation (3, 3) after the polygon `points` (v, j), v >= 2; all arrays of one dtype."""
-    problem = RotationProblem(steps, robot.parent, known_parameters(robot, pattern))
+    problem = RotationProblem(steps, robot.parent, known_parameters(pattern))
     return _end_rotation(problem, parameters(robot), points)
 
 

@@ -79,7 +79,7 @@ def inward(
         E = joint_rotation(e, *sine_cosine[k])
         push = apply(E, plus(p[link], times(rate[k], cross(e, f[link]))))
         spin = apply(E, plus(h[link], times(rate[k], apply_symmetric(J[link], e))))
-        rotor = times(mul(rate[k], robot.rotor_spin[k]), e)
+        rotor = times(mul(rate[k], robot.rotor_momentum[k]), e)
         moment = apply(E, f[link])
         p[parent] = plus(p[parent], push)
         h[parent] = plus(h[parent], plus(plus(spin, rotor), cross(a, push)))
