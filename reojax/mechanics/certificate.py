@@ -78,7 +78,7 @@ def certify_rotation(
     momentum = momentum_residual(robot, path, history)
     points = jnp.asarray(path.waypoints)
     middles = 0.5 * (points[:-1] + points[1:])
-    halved = jnp.concatenate([jnp.stack([points[:-1], middles], 1).reshape(-1, path.joints), points[-1:]])
+    halved = jnp.concatenate([jnp.stack([points[:-1], middles], 1).reshape(2 * path.edges, path.joints), points[-1:]])
     padded = jnp.concatenate([points, jnp.tile(points[-1:], (path.edges, 1))])
     both = jnp.stack([padded, halved])  # of one shape, so that one program is compiled and not two
     result, finer = jax.vmap(lambda waypoints: net_rotation(robot, Path(waypoints), steps=steps))(both)

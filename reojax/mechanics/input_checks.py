@@ -54,7 +54,7 @@ def check_path(robot: Robot, path: Path) -> Path:
 
 
 def _check_array(entry: str, value: Any, expected: tuple[int, ...]) -> None:
-    shape, dtype = np.shape(value), jnp.result_type(value)
+    shape, dtype = np.shape(value), value.dtype if hasattr(value, "dtype") else jnp.result_type(value)
     if shape != expected:
         more = "; for a stack of robots use jax.vmap" if shape[1:] == expected else ""
         raise ValueError(f"`{entry}` has shape {shape}; of one robot of this tree it must be {expected}{more}.")
@@ -84,16 +84,16 @@ def check_steps(entry: str, value: Any, least: int = 1) -> int:
     return checks.whole(entry, value, least, MOST_STEPS)
 
 
-def warn_if_unresolved(path: Path, steps: int, entry: str, stacklevel: int = 3) -> None:
-    """Warn, once for each place in the user's code, where an edge is too long for its steps; not while tracing."""
+def warn_if_unresolved(path: Path, steps: int, entry: str) -> None:
+    """Warn, at the line that calls the public function, where an edge is too long for its steps; not while tracing."""
     if path.edges and path.joints and is_concrete(path.waypoints):
         longest = float(np.abs(np.diff(np.asarray(path.waypoints, float), axis=0)).max())
         if longest > RESOLVED * steps:
             warnings.warn(
                 f"an edge of the path turns a joint by {longest:.4g} rad ({np.rad2deg(longest):.4g} degrees) in "
-                f"{steps} steps; beyond {RESOLVED} rad a step the result may be wrong. Angles are in radians; if these are, "
-                f"give `{entry}` of {int(np.ceil(longest / RESOLVED))} or more, and measure the error with "
+                f"{steps} steps; beyond {RESOLVED} rad a step the result may be wrong. Angles are in radians; if these "
+                f"are, give `{entry}` of {int(np.ceil(longest / RESOLVED))} or more, and measure the error with "
                 "`reojax.certify`.",
                 UserWarning,
-                stacklevel=stacklevel + 1,
+                stacklevel=3,
             )
