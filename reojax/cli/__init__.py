@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
-from reojax.cli import compare, export, merge, plan, simulate, sweep, time
+from reojax.cli import compare, export, merge, plan, simulate, sweep, time, view
 from reojax.cli._arguments import BadInput, Parser, join_negative_values, version
 
 COMMANDS = {
@@ -24,6 +24,7 @@ COMMANDS = {
     "plan": plan,
     "sweep": sweep,
     "merge": merge,
+    "view": view,
 }
 """Subcommands by name."""
 

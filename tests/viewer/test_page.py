@@ -1,7 +1,6 @@
 """The page in a real browser, headless: it loads nothing, shows the poses that the library has, and obeys."""
 
 import json
-import shutil
 import time
 
 import jax
@@ -11,32 +10,13 @@ import pytest
 import reojax
 from reojax import robots
 
-webdriver = pytest.importorskip("selenium.webdriver", reason="no selenium: pip install reojax[test]")
-from selenium.webdriver.common.keys import Keys  # noqa: E402  (after the check that it is there)
+pytest.importorskip("selenium", reason="no selenium: pip install reojax[test]")
+from selenium.webdriver.common.keys import Keys
 
 PROTOTYPE = robots.prototype()
 LOOP = reojax.manoeuvre_a(np.deg2rad(270.0), np.deg2rad(120.0))
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 NASTY = "</script><script>alert(1)</script>\"'`${1}&lt;<!--"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    chrome = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
-    driver = shutil.which("chromedriver")
-    if chrome is None or driver is None:
-        pytest.skip("no browser: the page is tested where chromium and chromedriver are installed")
-    options = webdriver.ChromeOptions()
-    options.binary_location = chrome
-    for flag in (
-        "headless=new no-sandbox use-gl=angle use-angle=swiftshader enable-unsafe-swiftshader no-first-run "
-        "disable-background-networking disable-component-update disable-sync window-size=1280,900"
-    ).split():
-        options.add_argument(f"--{flag}")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    page = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
-    yield page
-    page.quit()
 
 
 @pytest.fixture(scope="module")

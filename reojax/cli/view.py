@@ -1,0 +1,142 @@
+"""Show a turn in a browser: a manoeuvre or a plan as one HTML file, or the robot live with sliders (`--live`)."""
+
+import argparse
+import json
+from pathlib import Path as File
+from typing import TYPE_CHECKING, Any
+
+from reojax.cli._arguments import BadInput
+from reojax.cli._manoeuvre import add_manoeuvre, heading, path_of
+from reojax.cli._motors import seconds
+
+if TYPE_CHECKING:
+    from reojax.path import Path
+    from reojax.robot import Robot
+    from reojax.viewer.live import Live
+
+_HOUR = 3600
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `reojax view`."""
+    add = parser.add_argument
+    add("plan", nargs="?", metavar="PLAN.json", help="what `reojax plan --json` printed, instead of a manoeuvre")
+    add_manoeuvre(parser)
+    add("--duration", type=seconds, metavar="S", help="run it in this time, by a quintic law")
+    add("--beside", metavar="PLAN.json", help="another plan for the same robot, shown beside it")
+    add("--title", metavar="TEXT", help="headline of the page")
+    add("--out", metavar="PAGE.html", help="where to write the page [turn.html]")
+    add(
+        "--live",
+        action="store_true",
+        help="serve sliders for the joints on this machine only, until ctrl-c; needs viser",
+    )
+    add("--port", type=int, default=8080, metavar="N", help="where --live serves, or the next free one [%(default)d]")
+
+
+def run(args: argparse.Namespace) -> None:
+    """Write the page and say where it is, or serve until interrupted."""
+    from reojax import robots, session
+    from reojax._internal.files import check_ending
+
+    session.start()
+    try:
+        if args.live:
+            if args.out is not None or args.plan is not None or args.beside is not None:
+                raise ValueError("argument --live: it shows the robot alone, without PLAN.json, --beside or --out")
+            _serve(robots.by_name(args.robot), args.port)
+            return
+        out = args.out or "turn.html"
+        check_ending(out, "page", ("html", "htm"))
+        written = _write(args, out)
+    except ValueError as error:
+        raise BadInput(f"reojax view: {error}") from error
+    print(f"page in {written} ({written.stat().st_size / 1e3:.0f} kB); open it in a browser, it needs no network")
+
+
+def _write(args: argparse.Namespace, out: str) -> File:
+    import numpy as np
+
+    from reojax import robots
+    from reojax.motion.simulation import simulate
+    from reojax.viewer import view
+
+    plan = None if args.plan is None else read_plan(args.plan)
+    name = args.robot if plan is None else plan["config"]["robot"]
+    robot = robots.by_name(name)
+    shown: list[Any] = [path_of(robot, args) if plan is None else _path(robot, plan, str(args.plan))]
+    names = [_title(args) if plan is None else str(plan["config"].get("target", args.plan))]
+    if args.beside is not None:
+        other = read_plan(args.beside)
+        if other["config"]["robot"] != name:
+            raise ValueError(f"{args.beside!r} is a plan for {other['config']['robot']!r}, not for {name!r}.")
+        shown.append(_path(robot, other, args.beside))
+        names.append(str(other["config"].get("target", args.beside)))
+    if args.duration is not None:
+        for k, path in enumerate(shown):
+            angles = np.abs(np.diff(path.waypoints, axis=0)).max(axis=1)
+            if not angles.sum() > 0:
+                raise ValueError("argument --duration: nothing moves, so nothing takes time")
+            kept = np.concatenate([[True], angles > 0])
+            moving = type(path)(np.asarray(path.waypoints)[kept])
+            angles = angles[angles > 0]
+            shown[k] = simulate(robot, moving, durations=args.duration * angles / angles.sum())
+    return view(
+        robot,
+        shown[0],
+        out,
+        target=None if plan is None else np.asarray(plan["target_matrix"], float),
+        beside=shown[1] if len(shown) > 1 else None,
+        names=names,
+        title=args.title or names[0] if plan is None else args.title or f"Plan for {names[0]} on {name}",
+    )
+
+
+def _title(args: argparse.Namespace) -> str:
+    return heading(args).replace(" deg", "°").replace(" -", " \N{MINUS SIGN}")
+
+
+def read_plan(name: str) -> dict[str, Any]:
+    """What `reojax plan --json` printed to a file.
+
+    Raises:
+        ValueError: if it cannot be read, or is something else.
+    """
+    try:
+        report = json.loads(File(name).read_text("utf-8"))
+    except OSError as error:
+        raise ValueError(f"cannot read the plan {name!r}: {error.strerror or error}.") from error
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"cannot read the plan {name!r}: it is not JSON.") from error
+    keys = ("config", "waypoints_rad", "target_matrix")
+    if not isinstance(report, dict) or any(key not in report for key in keys):
+        raise ValueError(
+            f"{name!r} is not a plan: it must have {', '.join(keys)}, as `reojax plan --json` prints them."
+        )
+    if not isinstance(report["config"], dict) or not isinstance(report["config"].get("robot"), str):
+        raise ValueError(f"{name!r} is not a plan: its config must name the robot.")
+    return report
+
+
+def _path(robot: "Robot", plan: dict[str, Any], name: str) -> "Path":
+    from reojax._internal import checks
+    from reojax.path import polygon
+
+    return polygon(checks.numbers(f"{name}: waypoints_rad", plan["waypoints_rad"], (-1, robot.joints)))
+
+
+def _serve(robot: "Robot", port: int) -> None:
+    import time
+    import webbrowser
+
+    from reojax.viewer.live import serve
+
+    live: Live = serve(robot, port=port)
+    try:
+        where = f"http://{live.server.get_host()}:{live.server.get_port()}"
+        opened = webbrowser.open(where)
+        print(f"{where}{'' if opened else ': no browser was found here; open this address in one'}", flush=True)
+        while True:
+            time.sleep(_HOUR)
+    finally:
+        live.stop()
