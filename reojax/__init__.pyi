@@ -37,6 +37,8 @@ from reojax.planning.free_path import FreePaths, free_path, free_paths
 from reojax.planning.plan import plan, plan_many, replan
 from reojax.planning.result import Plan
 from reojax.robot import Robot, layout_of, make_robot
+from reojax.steering.gains import CorrectionGains as CorrectionGains, correction_gains as correction_gains
+from reojax.steering.tables import write_gains as write_gains
 from reojax.sweeps.grid import zipped
 from reojax.sweeps.merge import merge
 from reojax.sweeps.result import BadDesign, Sweep
@@ -61,6 +63,8 @@ __all__ = [
     "connection",
     "controllable_directions",
     "ControllableDirections",
+    "correction_gains",
+    "CorrectionGains",
     "curvature",
     "design",
     "Fastest",
@@ -134,6 +138,7 @@ __all__ = [
     "trapezoid",
     "view",
     "with_motors",
+    "write_gains",
     "write_trajectory",
     "zipped",
 ]

@@ -72,6 +72,7 @@ def test_no_function_hides_a_package():
 def test_the_public_list_is_complete():
     assert all(hasattr(reojax, name) for name in reojax.__all__)
     assert len(set(reojax.__all__)) == len(reojax.__all__)
+    assert reojax.Path.__module__ == "reojax.path"  # and not what __init__ imports for itself
     assert set(reojax._HOME) == set(reojax.__all__) <= set(dir(reojax))
 
 

@@ -1,0 +1,93 @@
+"""Gains as files for a microcontroller: CSV, and a C header of a few kilobytes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from reojax import so3
+from reojax.steering.gains import CorrectionGains
+
+_FIELDS = ("at", "theta", "theta_dot", "quaternion", "omega", "connection", "gain")
+_MEANING = {
+    "at": "time [s] or path parameter",
+    "theta": "joint angles [rad]",
+    "theta_dot": "their rates",
+    "quaternion": "orientation of the base, w x y z",
+    "omega": "angular velocity of the base, base frame",
+    "connection": "turn of the base per turn of each joint, base frame, row by row",
+    "gain": "change of each joint per error, row by row: p = -gain e",
+}
+
+
+def gain_table(gains: CorrectionGains) -> dict[str, np.ndarray]:
+    """What the on-board law (`reojax.steering.onboard`) reads, by name; quaternions do not change sign on the way."""
+    if not isinstance(gains, CorrectionGains):
+        raise ValueError(f"`gains` is a {type(gains).__name__}; it must be what `correction_gains` returns.")
+    quaternion = np.array([so3.to_quaternion(rotation) for rotation in gains.rotation], float)
+    for k in range(1, len(quaternion)):
+        quaternion[k] *= 1.0 if quaternion[k] @ quaternion[k - 1] >= 0 else -1.0
+    return {name: quaternion if name == "quaternion" else np.asarray(getattr(gains, name), float) for name in _FIELDS}
+
+
+def write_gains(gains: CorrectionGains, path: str | Path, *, name: str = "reojax_gains") -> None:
+    """Write the table of the on-board law: `.csv`, all digits, or `.h`, C arrays of `float`.
+
+    A row for each sample: time, joint angles and rates, orientation (w, x, y, z), angular velocity, connection (3 j)
+    and gain (3 j), 8 + 8 j numbers. Four edges of three joints at 8 samples an edge are 4.2 kB in a header's arrays.
+
+    Args:
+        gains: the gains.
+        path: file to write.
+        name: prefix of the header's names.
+
+    Raises:
+        ValueError: for another kind of file or a name that C does not have, or if it cannot be written.
+    """
+    path, table = Path(path), gain_table(gains)
+    if path.suffix not in (".csv", ".h"):
+        raise ValueError(f"`path` is {str(path)!r}; gains go to a .csv or a .h file.")
+    if not (name.isascii() and name.isidentifier()):
+        raise ValueError(f"`name` is {name!r}; it must be a name in C.")
+    text = _csv(table) if path.suffix == ".csv" else _header(table, name)
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ValueError(f"cannot write {str(path)!r}: {error.strerror}.") from error
+
+
+def _csv(table: dict[str, np.ndarray]) -> str:
+    names = []
+    for field, values in table.items():
+        ends = np.ndindex(values.shape[1:])
+        names += ["_".join([field, *map(str, index)]) for index in ends]
+    rows = np.concatenate([values.reshape(len(values), -1) for values in table.values()], axis=1)
+    return "\n".join([",".join(names), *(",".join(repr(float(x)) for x in row) for row in rows)]) + "\n"
+
+
+def _header(table: dict[str, np.ndarray], name: str) -> str:
+    samples, joints = table["theta"].shape
+    guard = f"{name.upper()}_H"
+    lines = [
+        "/* Correction gains of reojax. On board, with p the change of the joints and R the orientation here:",
+        "   e = log(measured (R exp(connection p))^T), wanted = -gain e, p follows wanted, joints = theta + p. */",
+        f"#ifndef {guard}",
+        f"#define {guard}",
+        f"#define {name.upper()}_SAMPLES {samples}",
+        f"#define {name.upper()}_JOINTS {joints}",
+    ]
+    for field, values in table.items():
+        sizes = "".join(f"[{size}]" for size in values.shape)
+        lines.append(f"/* {_MEANING[field]} */")
+        lines.append(f"static const float {name}_{field}{sizes} = {{")
+        lines += [f"  {_braced(row)}," for row in values]
+        lines.append("};")
+    return "\n".join([*lines, f"#endif /* {guard} */", ""])
+
+
+def _braced(values: np.ndarray) -> str:
+    if values.ndim:
+        return "{" + ", ".join(_braced(value) for value in values) + "}"
+    text = f"{np.float32(values):.9g}"
+    return f"{text}f" if any(c in text for c in ".en") else f"{text}.0f"
