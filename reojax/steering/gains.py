@@ -26,7 +26,7 @@ DEFAULT_SAMPLES = 16
 """Samples of each edge or piece."""
 DEFAULT_WINDOW = 0.1
 """Share of the motion over which a change starts and ends."""
-DEFAULT_LEFT = 1e-3
+DEFAULT_LEFT = 0.1
 """Share of an error that is left at the end, about the axis that is hardest to turn about."""
 LINEAR = 0.5
 """Change of a joint up to which the first variation is taken to hold, for `reach` [rad]."""
@@ -53,7 +53,8 @@ class CorrectionGains(NamedTuple):
     connection: Float[Array, "m 3 j"]
     """Local connection."""
     gain: Float[Array, "m j 3"]
-    """The law: change of the joints `p = -gain e` for the error `e` at the same instant [rad/rad]."""
+    """The law: change of the joints `p = -gain e` for the error `e` at the same instant [rad/rad],
+    `gain = direction (gramian + rest)^-1 to_end`."""
     authority: Float[Array, " m"]
     """Least eigenvalue of `gramian`: the more, the smaller the change that an error about the worst axis takes."""
     reach: Float[Array, " m"]
@@ -105,7 +106,9 @@ def correction_gains(
 
     the regulator of least effort for the error (J. T. Wen and K. Kreutz-Delgado, IEEE Trans. Autom. Control 36, 1991,
     for attitude; the open question of thesis 1.9). The bracket, the Gramian, is what the remaining motion can turn.
-    Coupled joints follow their drivers. With momentum, the error's own growth is accounted for.
+    Near the end the bracket vanishes, and `rest` bounds the gains. Coupled joints follow their drivers. With momentum,
+    the error's own growth is accounted for. This is the first variation: a correction of some tenths of a radian leaves
+    its square, which `Steering` solves for and which the law of `reojax.steering.onboard` sees in the next readings.
 
     Args:
         robot: the robot; of its joint limits only `reach` knows.
@@ -131,7 +134,7 @@ def correction_gains(
     start = np.zeros(3) if momentum is None else as_numbers("momentum", momentum)
     if start.shape != (3,) or (is_concrete(start) and not np.isfinite(start).all()):
         raise ValueError(f"`momentum` is {momentum}; it must be 3 finite numbers, in the inertial frame [kg m^2/s].")
-    return _gains(robot, motion, price, start, window, left, int(samples))
+    return _gains(robot, motion, price, start, (window, left), int(samples))
 
 
 def _check(robot: Robot, motion: Path | Trajectory | Motion, samples: int, window: float, left: float) -> None:
@@ -152,30 +155,31 @@ def _check(robot: Robot, motion: Path | Trajectory | Motion, samples: int, windo
         raise ValueError(f"`left` is {left!r}; it must be a share between 0 and 1.")
 
 
-@partial(jax.jit, static_argnums=6)
+@partial(jax.jit, static_argnums=5)
 def _gains(
-    robot: Robot, motion: Path | Trajectory | Motion, price: Array, momentum: Array, window: float, left: float, n: int
+    robot: Robot, motion: Path | Trajectory | Motion, price: Array, momentum: Array, shares: tuple[Array, ...], n: int
 ) -> CorrectionGains:
     dtype = common_float(robot, motion, momentum)
-    robot, motion, price, momentum = jax.tree.map(
-        lambda leaf: jnp.asarray(leaf, dtype), (robot, motion, price, momentum)
+    robot, motion, price, momentum, (window, left) = jax.tree.map(
+        lambda leaf: jnp.asarray(leaf, dtype), (robot, motion, price, momentum, shares)
     )
     nodes = nodes_of(robot, motion, momentum, n)
     g, growth = _over_nodes(partial(turn_per_change, robot), nodes, nodes.momentum)
     to_end = _transitions(nodes, growth)
     g = to_end @ g
-    weight = nodes.shape * _ramp(nodes.at, jnp.asarray(window, dtype))
+    weight = nodes.shape * _ramp(nodes.at, window)
     direction = weight[:, :, None, None] * (spread(robot, price) @ g.swapaxes(2, 3))
     gramian = remaining(nodes, g @ direction)
     # an error about the hardest axis shrinks to `left`; the rest is rounding where no joint can turn it at all
     full = gramian[0]
-    rest = jnp.asarray(left, dtype) * jnp.maximum(least_eigenvalue(full), 1e-6 * jnp.trace(full))
+    rest = left * jnp.maximum(least_eigenvalue(full), 1e-6 * jnp.trace(full))
     rest = jnp.maximum(rest, jnp.finfo(dtype).tiny ** 0.25)
 
     def first(values: Array) -> Array:
         return jnp.concatenate([values[:, 0], values[-1:, 2]])
 
-    direction, to_end, theta, rate, rotation = map(first, (direction, to_end, nodes.theta, nodes.rate, nodes.rotation))
+    own = nodes.theta, nodes.rate, nodes.rotation
+    direction, to_end, theta, rate, rotation = map(first, (direction, to_end, *own))
     stiff = gramian + rest * jnp.eye(3, dtype=dtype)[None]
     gain = direction @ jax.vmap(solve_symmetric3)(stiff, to_end)
     gamma, omega = jax.vmap(partial(_turning, robot, nodes.momentum))(theta, rate, rotation)

@@ -1,10 +1,14 @@
 """The law of `correction_gains` as a robot runs it: NumPy alone, nothing of JAX. Numbers from `write_gains`.
 
-At each tick, with the motion's own joints `theta` and orientation `R` at that time, the connection `Gamma` and the gain:
+The change of the joints is `p = -direction c` with a steering vector `c` (3,). A reading of the orientation, with the
+motion's own orientation `R` at that time and the connection `Gamma`, is off by
 
-    e = log(measured (R exp(Gamma p))^T),      wanted = -gain e,      p follows wanted,      joints = theta + p,
+    e = log(measured (R exp(Gamma p))^T),
 
-the second-order filter `p'' = (wanted - p) / tau^2 - 2 p' / tau` so that what the joints are told starts smoothly.
+and the changes that are under way already take back `gramian c` of it, less what the filter holds back. What is left
+of `e` after that adds `(gramian + rest)^-1 left` to `c`, the share of it that a reading is worth. `c` goes through a
+filter of second order, so that what the joints are told starts smoothly. Old readings do no harm, as only what is left
+acts.
 """
 
 from collections.abc import Mapping
@@ -15,45 +19,76 @@ import numpy as np
 
 
 class State(NamedTuple):
-    """What the law remembers; `start(joints)` before the motion."""
+    """What the law remembers."""
 
     time: float
     """Of the last tick [s]."""
-    change: np.ndarray
-    """(j,) `p` [rad]."""
+    steer: np.ndarray
+    """(3,) `c`."""
+    filtered: np.ndarray
+    """(3,) `c` behind the filter."""
     rate: np.ndarray
-    """(j,) [rad/s]."""
-    wanted: np.ndarray
-    """(j,) what the last reading asked for [rad]."""
+    """(3,) its rate."""
+    read: float
+    """When the last reading was taken [s]."""
+    past: np.ndarray
+    """(n, 4) times of the last ticks and `filtered` at each, the newest last."""
 
 
-def start(joints: int) -> State:
-    """No change yet."""
-    return State(0.0, np.zeros(joints), np.zeros(joints), np.zeros(joints))
+class Law:
+    """The law for one motion.
 
-
-def step(table: Mapping[str, np.ndarray], tau: float, state: State, time: float, measured=None, taken=None):
-    """Run the law for one tick: the new state, and what the joints are told (j,).
-
-    `measured` (3, 3) is the base's orientation, read at time `taken` (default now); None where there is no reading.
+    Args:
+        table: what `read` or `gain_table` gives.
+        tau: time constant of the filter [s].
+        settle: time over which readings are averaged: one that comes `h` after the last counts `1 - exp(-h / settle)`.
+        largest: largest change of a joint [rad].
+        memory: ticks that are remembered; readings must not be older.
     """
-    wanted = state.wanted
-    if measured is not None:
-        taken = time if taken is None else taken
-        row = at(table, taken)
-        change = state.change + (taken - state.time) * state.rate
-        error = log(measured @ (row["rotation"] @ exp(row["connection"] @ change)).T)
-        wanted = -row["gain"] @ error
-    h = time - state.time
-    gap, decay = state.change - wanted, np.exp(-h / tau)
-    slope = state.rate + gap / tau
-    change = wanted + (gap + h * slope) * decay
-    rate = (state.rate - h / tau * slope) * decay
-    return State(time, change, rate, wanted), at(table, time)["theta"] + change
+
+    def __init__(
+        self,
+        table: Mapping[str, np.ndarray],
+        *,
+        tau: float = 5e-3,
+        settle: float = 5e-3,
+        largest: float = 0.3,
+        memory: int = 32,
+    ):
+        self.table, self.tau, self.settle, self.largest, self.memory = table, tau, settle, largest, memory
+
+    def start(self) -> State:
+        """No change yet."""
+        return State(0.0, np.zeros(3), np.zeros(3), np.zeros(3), 0.0, np.zeros((self.memory, 4)))
+
+    def step(self, state: State, time: float, seen: tuple[np.ndarray, float] | None = None) -> tuple[State, np.ndarray]:
+        """One tick: the new state, and joint angles (j,) to go to [rad].
+
+        `seen` is an orientation of the base (3, 3) and the time when it was read, if there is one.
+        """
+        tau, now, (_, c, filtered, rate, read) = self.tau, at(self.table, time), state[:5]
+        if seen is not None:
+            then = at(self.table, seen[1])
+            before = np.array([np.interp(seen[1], state.past[:, 0], column) for column in state.past[:, 1:].T])
+            own = then["rotation"] @ exp(then["connection"] @ (-then["direction"] @ before))
+            under_way = (then["gramian"] - now["gramian"]) @ (before + filtered) / 2 + now["gramian"] @ c
+            held_back = now["density"] @ (2 * tau * (filtered - c) + tau**2 * rate)
+            left = log(seen[0] @ own.T) - under_way - held_back
+            can = now["gramian"] - 2 * tau * now["density"] + now["rest"] * np.eye(3)
+            worth = 1 - np.exp(-(seen[1] - read) / self.settle)
+            c, read = c + worth * np.linalg.solve(positive(can, float(now["rest"])), left), seen[1]
+            most = np.abs(self.table["direction"][self.table["at"] >= time] @ c).max(initial=0.0)
+            c = c * min(1.0, self.largest / max(most, 1e-12))
+        h = time - state.time
+        gap, decay = filtered - c, np.exp(-h / tau)
+        slope = rate + gap / tau
+        filtered, rate = c + (gap + h * slope) * decay, (rate - h / tau * slope) * decay
+        past = np.vstack([state.past[1:], [time, *filtered]])
+        return State(time, c, filtered, rate, read, past), now["theta"] - now["direction"] @ filtered
 
 
 def at(table: Mapping[str, np.ndarray], time: float) -> dict[str, np.ndarray]:
-    """Everything at one time: joints and orientation by cubics, connection and gain by straight lines."""
+    """Everything at one time: joints and orientation by cubics, the rest by straight lines."""
     times = table["at"]
     k = int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2))
     h = times[k + 1] - times[k]
@@ -68,7 +103,9 @@ def at(table: Mapping[str, np.ndarray], time: float) -> dict[str, np.ndarray]:
     pair = np.stack([q[k], q[k + 1]]) * [[1.0], [1.0 if q[k] @ q[k + 1] >= 0 else -1.0]]
     spin[1] = spin[1] * (1.0 if q[k] @ q[k + 1] >= 0 else -1.0)
     turned = (1 - a) * pair[0] + a * pair[1] + h * b * ((1 - u) * spin[0] - u * spin[1])
-    found = {name: (1 - u) * table[name][k] + u * table[name][k + 1] for name in ("connection", "gain")}
+    lines = ("connection", "direction", "gramian", "rest")
+    found = {name: (1 - u) * table[name][k] + u * table[name][k + 1] for name in lines}
+    found["density"] = (table["gramian"][k] - table["gramian"][k + 1]) / h
     return found | {"theta": cubic(table["theta"], table["theta_dot"]), "rotation": matrix(turned)}
 
 
@@ -79,13 +116,19 @@ def read(path: str | Path) -> dict[str, np.ndarray]:
         rows = np.loadtxt(file, delimiter=",", ndmin=2)
     joints = sum(name.startswith("theta_dot") for name in names)
     shapes = {"at": (), "theta": (joints,), "theta_dot": (joints,), "quaternion": (4,), "omega": (3,)}
-    shapes |= {"connection": (3, joints), "gain": (joints, 3)}
+    shapes |= {"connection": (3, joints), "direction": (joints, 3), "gramian": (3, 3), "rest": ()}
     table, column = {}, 0
     for name, shape in shapes.items():
         width = int(np.prod(shape, dtype=int))
         table[name] = rows[:, column : column + width].reshape(len(rows), *shape)
         column += width
     return table
+
+
+def positive(matrix: np.ndarray, least: float) -> np.ndarray:
+    """The symmetric matrix with its eigenvalues raised to `least`."""
+    values, vectors = np.linalg.eigh(matrix)
+    return vectors * np.maximum(values, least) @ vectors.T
 
 
 def exp(vector: np.ndarray) -> np.ndarray:

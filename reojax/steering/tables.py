@@ -9,7 +9,7 @@ import numpy as np
 from reojax import so3
 from reojax.steering.gains import CorrectionGains
 
-_FIELDS = ("at", "theta", "theta_dot", "quaternion", "omega", "connection", "gain")
+_FIELDS = ("at", "theta", "theta_dot", "quaternion", "omega", "connection", "direction", "gramian", "rest")
 _MEANING = {
     "at": "time [s] or path parameter",
     "theta": "joint angles [rad]",
@@ -17,7 +17,9 @@ _MEANING = {
     "quaternion": "orientation of the base, w x y z",
     "omega": "angular velocity of the base, base frame",
     "connection": "turn of the base per turn of each joint, base frame, row by row",
-    "gain": "change of each joint per error, row by row: p = -gain e",
+    "direction": "change of each joint per steering vector, row by row: p = -direction c",
+    "gramian": "what the rest of the motion can turn, row by row",
+    "rest": "added to its diagonal",
 }
 
 
@@ -28,14 +30,18 @@ def gain_table(gains: CorrectionGains) -> dict[str, np.ndarray]:
     quaternion = np.array([so3.to_quaternion(rotation) for rotation in gains.rotation], float)
     for k in range(1, len(quaternion)):
         quaternion[k] *= 1.0 if quaternion[k] @ quaternion[k - 1] >= 0 else -1.0
-    return {name: quaternion if name == "quaternion" else np.asarray(getattr(gains, name), float) for name in _FIELDS}
+    table = {name: np.asarray(getattr(gains, name), float) for name in _FIELDS if name != "quaternion"}
+    table["rest"] = np.full(len(quaternion), table["rest"])
+    return {name: quaternion if name == "quaternion" else table[name] for name in _FIELDS}
 
 
 def write_gains(gains: CorrectionGains, path: str | Path, *, name: str = "reojax_gains") -> None:
     """Write the table of the on-board law: `.csv`, all digits, or `.h`, C arrays of `float`.
 
-    A row for each sample: time, joint angles and rates, orientation (w, x, y, z), angular velocity, connection (3 j)
-    and gain (3 j), 8 + 8 j numbers. Four edges of three joints at 8 samples an edge are 4.2 kB in a header's arrays.
+    A row for each sample: time, joint angles and rates, orientation (w, x, y, z), angular velocity, connection (3 j),
+    direction (3 j), Gramian (9) and rest, 18 + 8 j numbers. Four edges of three joints at 8 samples an edge are 5.5 kB
+    of C floats, and hold joints and orientation to some 2e-3 rad; at 16 samples 11 kB and 1e-4 rad.
+    `direction (gramian + rest)^-1` is the gain. For motions without momentum: `to_end` is left out.
 
     Args:
         gains: the gains.
@@ -71,7 +77,8 @@ def _header(table: dict[str, np.ndarray], name: str) -> str:
     guard = f"{name.upper()}_H"
     lines = [
         "/* Correction gains of reojax. On board, with p the change of the joints and R the orientation here:",
-        "   e = log(measured (R exp(connection p))^T), wanted = -gain e, p follows wanted, joints = theta + p. */",
+        "   e = log(measured (R exp(connection p))^T), joints = theta + p, p = -direction c; the steering vector c",
+        "   takes back what is left of the error: reojax/steering/onboard.py is the law. */",
         f"#ifndef {guard}",
         f"#define {guard}",
         f"#define {name.upper()}_SAMPLES {samples}",

@@ -55,13 +55,14 @@ def test_a_change_that_only_carries_the_ends_along_is_a_boundary_term():
 def test_the_change_takes_back_an_error_up_to_second_order():
     """Added to the path, it turns the end by minus the error; what is left falls with the square of the error."""
     error = np.array([0.3, -0.2, 0.4])
-    planned = GAINS.rotation[-1]
     turn = jax.jit(lambda corners: reojax.net_rotation(ROBOT, reojax.Path(corners), steps=1))
+    sharp = reojax.correction_gains(ROBOT, PATH, samples=96, left=1e-4)
     left = []
     for size in (2e-3, 1e-3):
-        changed = turn(GAINS.theta + GAINS.change(0, size * error))
-        left.append(np.linalg.norm(turned_off(so3.exp(jnp.asarray(size * error)) @ changed, planned)) / size)
-    assert left[0] < 0.02 and 1.7 < left[0] / left[1] < 2.3
+        changed = turn(sharp.theta + sharp.change(0, size * error))
+        left.append(np.linalg.norm(turned_off(so3.exp(jnp.asarray(size * error)) @ changed, GAINS.rotation[-1])) / size)
+    assert left[0] < 0.05
+    assert 1.7 < left[0] / left[1] < 2.3
     assert (np.asarray(GAINS.change(20, error))[:20] == 0).all()
 
 
@@ -72,11 +73,12 @@ def test_gain_is_window_times_curvature_over_gramian():
     g = np.asarray(GAINS.rotation[k]) @ np.einsum("aik,k->ai", forms, np.asarray(GAINS.theta_dot[k]))
     window = 30 * (3 / 16) ** 2 * (13 / 16) ** 2
     np.testing.assert_allclose(GAINS.direction[k], window * g.T, rtol=1e-9, atol=1e-12)
-    rest = float(GAINS.rest)
-    np.testing.assert_allclose(GAINS.gain[k] @ (GAINS.gramian[k] + rest * np.eye(3)), GAINS.direction[k], atol=1e-12)
+    stiff = GAINS.gramian[k] + GAINS.rest * np.eye(3)
+    np.testing.assert_allclose(GAINS.gain[k] @ stiff, GAINS.direction[k], atol=1e-12)
     lowest = np.linalg.eigvalsh(np.asarray(GAINS.gramian))[:, 0]
     np.testing.assert_allclose(GAINS.authority, lowest, atol=1e-12)
-    assert (np.diff(GAINS.authority) <= 1e-12).all() and GAINS.authority[-1] == 0 and GAINS.reach[-1] == 0
+    assert (np.diff(GAINS.authority) <= 1e-12).all()
+    assert GAINS.authority[-1] == GAINS.reach[-1] == 0
 
 
 def closed_loop(gains, error, momentum=None) -> np.ndarray:
@@ -151,14 +153,16 @@ def test_coupled_and_held_joints():
     np.testing.assert_allclose(change[:, 2], -change[:, 0], atol=1e-15)
     assert np.abs(change[:, 0]).max() > 1e-4
     held = reojax.correction_gains(ROBOT, PATH, samples=16, weights=[1, np.inf, 1])
-    assert (np.asarray(held.gain)[:, 1] == 0).all() and np.abs(held.gain[:, 0]).max() > 0
+    assert (np.asarray(held.gain)[:, 1] == 0).all()
+    assert np.abs(held.gain[:, 0]).max() > 0
 
 
 def test_a_robot_that_cannot_turn_about_an_axis_has_no_authority():
     """A planar robot: all gains are finite, and only the plane's axis is corrected."""
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
     gains = reojax.correction_gains(robots.planar(3), reojax.polygon(corners), samples=16)
-    assert np.isfinite(gains.gain).all() and np.abs(gains.authority).max() < 1e-12
+    assert np.isfinite(gains.gain).all()
+    assert np.abs(gains.authority).max() < 1e-12
     assert (gains.reach == 0).all()
     assert np.abs(gains.gain).max() > 0.1
 
@@ -178,35 +182,41 @@ def test_the_files_hold_the_table(tmp_path):
     assert table.keys() == again.keys()
     assert all((table[name] == again[name]).all() for name in table)
     write_gains(TIMED, tmp_path / "gains.h", name="turn")
-    assert sum(values.size for values in table.values()) * 4 < 5000
+    assert sum(values.size for values in table.values()) * 4 < 6000
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler")
     (tmp_path / "main.c").write_text(
         '#include <stdio.h>\n#include "gains.h"\nint main(void) { for (int k = 0; k < TURN_SAMPLES; k++)'
-        ' for (int i = 0; i < 3 * TURN_JOINTS; i++) printf("%.9g\\n", ((const float *)turn_gain[k])[i]); return 0; }'
+        ' for (int i = 0; i < 3 * TURN_JOINTS; i++) printf("%.9g\\n", ((const float *)turn_direction[k])[i]);'
+        " return 0; }"
     )
     subprocess.run([compiler, "-o", tmp_path / "main", tmp_path / "main.c"], check=True)
     printed = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout
-    np.testing.assert_array_equal(np.array(printed.split(), np.float32), table["gain"].ravel().astype(np.float32))
+    np.testing.assert_array_equal(np.array(printed.split(), np.float32), table["direction"].ravel().astype(np.float32))
 
 
-def test_the_onboard_law_follows_the_table_and_takes_an_error_back(tmp_path):
-    """Between samples it is the motion to 1e-4; fed by true orientations, it ends on the planned one."""
-    table = gain_table(TIMED)
-    for time in (0.05, 0.21, 0.4):
-        row = onboard.at(table, time)
-        np.testing.assert_allclose(row["theta"], TRAJECTORY.at(time).theta, atol=2e-3)
-    state, told, off = onboard.start(3), [TRAJECTORY.at(0.0).theta], onboard.exp(np.array([0.03, 0.02, -0.03]))
-    rotation, ticks = off, np.arange(1, 311) * 2e-3
+@pytest.mark.parametrize("lag", [1, 4])
+def test_the_onboard_law_takes_an_error_back(lag):
+    """Fed by true orientations that are `lag` ticks old, smooth joints end on the planned orientation."""
+    table, tick = gain_table(reojax.correction_gains(ROBOT, TRAJECTORY, samples=16)), 2e-3
+    nearby = [onboard.at(table, time)["theta"] - TRAJECTORY.at(time).theta for time in (0.05, 0.21, 0.4)]
+    assert np.abs(nearby).max() < 2e-3
+    off = onboard.exp(4e-3 * np.array([1.0, 0.7, -1.0]))
+    law = onboard.Law(table)
+    state, joints, rotations = law.start(), [np.asarray(TRAJECTORY.at(0.0).theta)], [off]
     turn = jax.jit(lambda a, b: reojax.net_rotation(ROBOT, reojax.Path(jnp.stack([a, b])), steps=1))
-    for time in ticks:
-        state, joints = onboard.step(table, 5e-3, state, time, rotation, time - 2e-3)
-        rotation = rotation @ np.asarray(turn(told[-1], joints))
-        told.append(joints)
-    alone = np.linalg.norm(onboard.log(off))
-    assert np.linalg.norm(onboard.log(rotation @ np.asarray(TIMED.rotation[-1]).T)) < 0.1 * alone
-    assert np.abs(np.diff(np.array(told) - [TRAJECTORY.at(t).theta for t in [0, *ticks]], axis=0)).max() < 0.05
+    for k in range(1, 311):
+        seen = (rotations[-lag], (k - lag) * tick) if k >= lag else None
+        state, told = law.step(state, k * tick, seen)
+        rotations.append(rotations[-1] @ np.asarray(turn(joints[-1], told)))
+        joints.append(told)
+    left = np.linalg.norm(onboard.log(rotations[-1] @ np.asarray(TIMED.rotation[-1]).T))
+    assert left < 0.02 * np.linalg.norm(onboard.log(off))
+    np.testing.assert_allclose(joints[-1], PATH.waypoints[-1], atol=1e-12)
+    change = np.array(joints) - [TRAJECTORY.at(k * tick).theta for k in range(311)]
+    assert 0.01 < np.abs(change).max() < 0.3
+    assert np.abs(np.diff(change, axis=0, n=2)).max() < 6e-3  # a jump of the change would be 0.1
 
 
 @pytest.mark.parametrize(
