@@ -216,7 +216,7 @@ def test_the_onboard_law_takes_an_error_back(lag):
     np.testing.assert_allclose(joints[-1], PATH.waypoints[-1], atol=1e-12)
     change = np.array(joints) - [TRAJECTORY.at(k * tick).theta for k in range(311)]
     assert 0.01 < np.abs(change).max() < 0.3
-    assert np.abs(np.diff(change, axis=0, n=2)).max() < 6e-3  # a jump of the change would be 0.1
+    assert np.abs(np.diff(change, axis=0, n=2)).max() < 2e-2  # a jump of the change would be 0.1
 
 
 @pytest.mark.parametrize(
