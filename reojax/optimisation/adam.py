@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
-from reojax.optimisation.optimise import Solution, check_starts
+from reojax.optimisation.arguments import check_starts, check_tolerances
+from reojax.optimisation.optimise import Solution
+from reojax.optimisation.status import Status
 
 
 def descend(
@@ -44,36 +46,43 @@ def descend(
     Raises:
         ValueError: as `optimise`.
     """
-    x, bounds = check_starts(starts, lower, upper, None, data)
+    x, box = check_starts(starts, lower, upper, None, data)
     checks.whole("steps", steps)
-    for entry, number in (("rate", rate), ("slope_tolerance", slope_tolerance)):
-        if not np.isfinite(number) or number <= 0:
-            raise ValueError(f"`{entry}` is {number!r}; it must be a positive number.")
+    check_tolerances(rate=rate, slope_tolerance=slope_tolerance)
     data = jax.tree.map(jnp.asarray, data)
+    bounds = tuple(np.asarray(part, x.dtype) for part in box)
     best, least, slope = (np.asarray(a) for a in _descend(cost, int(steps), float(rate), data is None, x, data, bounds))
     finite = np.isfinite(least)
+    converged = finite & (slope <= slope_tolerance)
     return Solution(
-        value=np.clip(best, bounds["lower"], bounds["upper"]),
+        value=np.clip(best, box.lower, box.upper),
         cost=least,
         residual=np.where(finite, 0.0, np.inf),
         slope=slope,
         steps=np.full(len(best), steps),
-        converged=finite & (slope <= slope_tolerance),
+        converged=converged,
         best=int(np.argmin(least)),
+        status=np.where(converged, Status.CONVERGED, np.where(finite, Status.OUT_OF_STEPS, Status.NOT_FINITE)),
     )
 
 
 @partial(jax.jit, static_argnums=(0, 1, 2, 3))
 def _descend(
-    cost: Callable[..., Any], steps: int, rate: float, alone: bool, x: Array, data: Any, bounds: dict[str, Array]
+    cost: Callable[..., Any],
+    steps: int,
+    rate: float,
+    alone: bool,
+    x: Array,
+    data: Any,
+    bounds: tuple[Array, Array, Array],
 ) -> tuple[Array, Array, Array]:
     import optax
 
-    size = jnp.asarray(bounds["size"])
-    low, high = bounds["lower"] / size, bounds["upper"] / size
+    size = jnp.asarray(bounds[2])
+    low, high = bounds[0] / size[None], bounds[1] / size[None]
     optimiser = optax.adam(optax.cosine_decay_schedule(rate, steps, alpha=1e-3))
 
-    def one(start: Array, data: Any) -> tuple[Array, Array, Array]:
+    def one(start: Array, low: Array, high: Array, data: Any) -> tuple[Array, Array, Array]:
         value = jax.value_and_grad(
             lambda x: jnp.asarray(cost(x * size) if alone else cost(x * size, data), start.dtype)
         )
@@ -90,8 +99,8 @@ def _descend(
             return (jnp.clip(x + change, low, high), memory, best, least, slope, first), None
 
         worst = jnp.asarray(jnp.inf, start.dtype)
-        begin = (start, optimiser.init(start), start, worst, worst, jnp.zeros((), start.dtype))
-        (_, _, best, least, slope, _), _ = jax.lax.scan(step, begin, None, length=steps + 1)
+        first = (start, optimiser.init(start), start, worst, worst, jnp.zeros((), start.dtype))
+        (_, _, best, least, slope, _), _ = jax.lax.scan(step, first, None, length=steps + 1)
         return best * size, least, slope
 
-    return jax.vmap(one)(x / size[None], data)
+    return jax.vmap(one)(x / size[None], low, high, data)

@@ -1,289 +1,333 @@
-"""One start of a constrained minimisation: sequential quadratic programming with an exact penalty.
+"""Sequential quadratic programming from many starts, on the host, in double precision.
 
-Scaled so that variables range over about 1 and gradients are about 1 at the start. A step from x solves
+Scaled so that variables range over about 1 and gradients are about 1 at the start. At a point x a step d solves
 
-    minimise  g.d + d.B d / 2 + price * violation of (c + J d)    within bounds and |d| <= radius,
+    minimise  g.d + d.B d / 2   with  c + J d = 0 (equalities),  c + J d <= 0 (inequalities),  within bounds
 
-with exact first derivatives and B a damped BFGS estimate of the Lagrangian's Hessian (M. J. D. Powell, Numerical
-Analysis, Dundee 1977, 144-157). Because the price is finite the program always has an answer. The step is shortened
-along the line x + a d, and then along the arc x + a d + a^2 e whose bend e takes back what the constraints' curvature
-has added (D. Q. Mayne, E. Polak, Math. Programming Study 16, 45-61, 1982): of all these points the one of least
-`cost + price * violation` is taken. Without the arc, steps along strongly curved constraints (the net rotation of
-a loop is one) become short.
+(`quadratic`), with exact first derivatives and B a damped BFGS estimate of the Lagrangian's Hessian (`bfgs`). The full
+step is taken if it lowers the merit `cost + sum of penalty_i * violation_i` enough (S. P. Han, J. Optim. Theory Appl.
+22, 297-309, 1977; penalties follow the multipliers as in M. J. D. Powell, Numerical Analysis, Dundee 1977, 144-157),
+else a point of the line or of the second-order correction's arc (`line_search`). Where the linearised constraints have
+no common point, steps restore feasibility instead: the merit is half the sum of squared violations until they do. A
+start that ends where violations have a local least is moved aside and goes on, `RESTARTS` times at most; the moves are
+the same for every start.
+
+Each round differentiates the trial points of all running starts in one go; starts that have ended are left out.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Bool, Float, Int
 
-from reojax._internal.arrays import Array
-from reojax._internal.linalg import factor, solve_factored
-from reojax.optimisation.interior_point import Quadratic, solve_quadratic
+from reojax.optimisation.bfgs import update
+from reojax.optimisation.functions import Derivatives, Programs, Values
+from reojax.optimisation.line_search import SUFFICIENT, search
+from reojax.optimisation.merit import largest_violation, merit, predict, stationarity
+from reojax.optimisation.quadratic import solve_quadratic
+from reojax.optimisation.status import Status
 
-LENGTHS = np.array([1.0, 0.5, 0.25, 0.1, 0.03, 0.004])
-"""Fractions of a step that are tried, on the line and on the arc."""
-_FIRST_RADIUS, _LARGEST_RADIUS, _LEAST_RADIUS = 0.5, 2.0, 1e-9
+RUNNING = -1
+"""Status of a start that goes on."""
+RESTARTS, ASIDE = 3, 0.3
+"""How often a start may leave a local least of the violations, and by how much of the variables' ranges."""
+_LEAST_SCALE = 1e-2
+"""Rows that look flat at the start are not blown up by more than this."""
 _STILL, _PATIENCE = 1e-9, 12
-"""Steps shorter than this, so many in a row, end a start; the price can rise to its largest meanwhile."""
-_FIRST_PRICE, _HEMMED_PRICE, _LARGEST_PRICE = 100.0, 300.0, 1e5
-RUNNING, CONVERGED, STALLED, NOT_FINITE = range(4)
+"""Steps shorter than this, so many in a row, end a start."""
+_MOST_DAMPING = 1e9
+"""Curvature in all directions, after steps have failed so often, that ends a start."""
+_ARRIVED = 1e-6
+"""A start ends at a stationary point when its next step is shorter than this, fails, or ends at another one."""
+_FLAT = 1e-9
+"""Predicted reduction of half the squared violations, relative to them, that counts as none."""
 
 
-class Values(NamedTuple):
-    """Cost and constraints of a point."""
+class Problem(NamedTuple):
+    """The functions, and what the variables of each start may be, in scaled variables."""
 
-    cost: Array
-    vanish: Array
-    """Must be 0."""
-    below: Array
-    """Must not be positive."""
+    programs: Programs
+    lower: Float[np.ndarray, "m n"]
+    upper: Float[np.ndarray, "m n"]
+    scale: Float[np.ndarray, " n"]
+    precision: float
+    """Rounding of the functions, relative."""
+    tolerance: float
+    """For the constraints, in the user's own units."""
+    slope_tolerance: float
+    max_steps: int
+
+    def values(self, x: np.ndarray, owner: np.ndarray) -> Values:
+        """At scaled points."""
+        return self.programs.values(x * self.scale, owner)
+
+    def derivatives(self, x: np.ndarray, owner: np.ndarray) -> tuple[Values, Derivatives]:
+        """By the scaled variables."""
+        values, slopes = self.programs.derivatives(x * self.scale, owner)
+        return values, Derivatives(slopes.gradient * self.scale, slopes.jacobian * self.scale)
 
 
-class Subproblem(NamedTuple):
-    """The functions of a problem at its data, and its bounds, in the scaled variables."""
+@dataclass
+class Iterates:
+    """All starts on their way, one a row. Scaled: `cost` by `cost_scale`, constraint rows by `row_scale`."""
 
-    evaluate: Callable[[Array], Values]
-    differentiate: Callable[[Array], tuple[Values, Values]]
-    """Values and their gradients by the variables (last axis)."""
-    lower: Array
-    upper: Array
-    tolerance: Array
-    """For the constraints in the user's own units."""
-    slope_tolerance: Array
-
-
-class Iterate(NamedTuple):
-    """A start on its way: where it was last differentiated, and where it goes next."""
-
-    x: Array
-    now: Values
-    slopes: Values
-    ahead: Array
+    x: Float[np.ndarray, "m n"]
+    """Where each is."""
+    f: Float[np.ndarray, " m"]
+    c: Float[np.ndarray, "m q"]
+    gradient: Float[np.ndarray, "m n"]
+    jacobian: Float[np.ndarray, "m q n"]
+    cost_scale: Float[np.ndarray, " m"]
+    row_scale: Float[np.ndarray, "m q"]
+    hessian: Float[np.ndarray, "m n n"]
+    """B."""
+    fresh: Bool[np.ndarray, " m"]
+    """Whether B has not yet been measured."""
+    damping: Float[np.ndarray, " m"]
+    """What B is a multiple of when it begins again after a failed step."""
+    multipliers: Float[np.ndarray, "m q"]
+    """Of the constraints, from the last program that could meet them."""
+    penalty: Float[np.ndarray, "m q"]
+    restoring: Bool[np.ndarray, " m"]
+    """Whether the last program could not, so that the step restores feasibility."""
+    step: Float[np.ndarray, "m n"]
+    reduction: Float[np.ndarray, " m"]
+    """Change of the merit that the program predicts, not positive."""
+    rounding: Float[np.ndarray, " m"]
+    """Of the merit."""
+    here: Float[np.ndarray, " m"]
+    """The merit at x."""
+    trial: Float[np.ndarray, "m n"]
     """The point to differentiate next."""
-    multipliers: Array
-    """Of the program that led there, all rows."""
-    scale: Values
-    """What cost and constraints are divided by."""
-    curvature: Array
-    fresh: Array
-    """Whether the curvature has not yet been measured."""
-    price: Array
-    radius: Array
-    slope: Array
-    steps: Array
-    still: Array
-    """Steps since one that went anywhere."""
-    status: Array
+    chosen: Bool[np.ndarray, " m"]
+    """Whether the trial point is taken wherever the functions are finite."""
+    slope: Float[np.ndarray, " m"]
+    """Stationarity at x."""
+    steps: Int[np.ndarray, " m"]
+    stalled_steps: Int[np.ndarray, " m"]
+    arrived: Bool[np.ndarray, " m"]
+    """Whether both tolerances were met at x when it was reached."""
+    restarts: Int[np.ndarray, " m"]
+    nearest: list[tuple[float, np.ndarray, float, np.ndarray] | None]
+    """Least violation where a start was moved aside, with x, f and c there."""
+    status: Int[np.ndarray, " m"]
+    equalities: int
+
+    @property
+    def cost(self) -> Float[np.ndarray, " m"]:
+        """In the user's units."""
+        return self.f * self.cost_scale
+
+    @property
+    def violation(self) -> Float[np.ndarray, " m"]:
+        """Largest of each start, in the user's units."""
+        return largest_violation(self.c * self.row_scale, self.equalities)
 
 
-def begin(problem: Subproblem, x: Array) -> Iterate:
-    """Return the state before the first step; nothing is evaluated yet."""
-    n, dtype = x.shape[0], x.dtype
-    shape = jax.eval_shape(problem.evaluate, x)
-    now = jax.tree.map(lambda value: jnp.zeros(value.shape, dtype), shape)
-    slopes = jax.tree.map(lambda value: jnp.zeros((*value.shape, n), dtype), shape)
-    return Iterate(
-        x=x,
-        now=now,
-        slopes=slopes,
-        ahead=x,
-        multipliers=jnp.zeros(now.vanish.size + now.below.size, dtype),
-        scale=jax.tree.map(jnp.ones_like, now),
-        curvature=jnp.eye(n, dtype=dtype),
-        fresh=jnp.asarray(True),
-        price=jnp.asarray(_FIRST_PRICE, dtype),
-        radius=jnp.asarray(_FIRST_RADIUS, dtype),
-        slope=jnp.asarray(jnp.inf, dtype),
-        steps=jnp.zeros((), jnp.int32),
-        still=jnp.zeros((), jnp.int32),
-        status=jnp.asarray(RUNNING, jnp.int32),
-    )
+def minimise(problem: Problem, x: Float[np.ndarray, "m n"], report: Callable[[int], Any]) -> Iterates:
+    """Run all starts to their ends; `report` is told how many have got there."""
+    ahead = problem.derivatives(x, np.arange(len(x)))
+    run = _begin(problem, x, *ahead)
+    while (going := np.flatnonzero(run.status == RUNNING)).size:
+        values, slopes = problem.derivatives(run.trial[going], going) if run.steps.any() else _rows_of(ahead, going)
+        values = Values(values.cost / run.cost_scale[going], values.rows / run.row_scale[going])
+        gradient = slopes.gradient / run.cost_scale[going, None]
+        jacobian = slopes.jacobian / run.row_scale[going, :, None]
+        finite = _finite(values, gradient, jacobian)
+        reached = merit(values.cost, values.rows, run.penalty[going], run.restoring[going], run.equalities)
+        enough = run.here[going] + SUFFICIENT * run.reduction[going] + run.rounding[going]
+        taken = finite & (run.chosen[going] | (reached <= enough))
+
+        _move(problem, run, going[taken], values, gradient, jacobian, taken)
+        failed = _search(problem, run, going[~taken], values.rows[~taken])
+        ready = np.concatenate([going[taken], failed])
+        ready = ready[run.status[ready] == RUNNING]
+        out = run.steps[ready] >= problem.max_steps
+        run.status[ready[out]] = Status.OUT_OF_STEPS
+        _solve(problem, run, ready[~out])
+        report(int((run.status != RUNNING).sum()))
+    _return_to_nearest(run)
+    return run
 
 
-def advance(problem: Subproblem, state: Iterate) -> Iterate:
-    """Differentiate at the point ahead, and choose the next one; unless the start has ended."""
-    now, slopes = problem.differentiate(state.ahead)
-    first, finite = state.steps == 0, _finite(now, slopes)
-    here = state._replace(
-        x=state.ahead,
-        now=now,
-        slopes=slopes,
-        scale=jax.tree.map(lambda a, b: jnp.where(first, a, b), _scale(slopes), state.scale),
-    )
-    here = jax.tree.map(lambda a, b: jnp.where(finite, a, b), here, state)  # not finite: stay where it was
-    before, after = (_lagrangian_slope(s) for s in (state._replace(scale=here.scale), here))
-    change = jnp.where(problem.upper > problem.lower, after - before, 0.0)  # held variables stay out of the curvature
-    curvature, fresh = _measure(state, here.x - state.x, change, ~first)
-    radius = jnp.where(finite, here.radius, 0.2 * here.radius)
-    here = here._replace(curvature=curvature, fresh=fresh, slope=_slope(problem, here, after), radius=radius)
-    met = finite & (residual(here.now) <= problem.tolerance) & (here.slope <= problem.slope_tolerance)
-
-    program = _program(problem, here)
-    d, multipliers = solve_quadratic(program)
-    ahead, better = _search(problem, here, program, d)
-    length = jnp.where(better, jnp.abs(ahead - here.x).max(), 0.0)
-    wide = jnp.where(length >= 0.9 * here.radius, 2 * here.radius, jnp.maximum(2 * length, 0.5 * here.radius))
-    radius = jnp.where(better, jnp.minimum(wide, _LARGEST_RADIUS), 0.2 * here.radius)
-    still = jnp.where(length < _STILL, state.still + 1, 0)
-    stalled = (~better & (radius < _LEAST_RADIUS)) | (still >= _PATIENCE)
-    status = jnp.where(met, CONVERGED, jnp.where(first & ~finite, NOT_FINITE, jnp.where(stalled, STALLED, RUNNING)))
-    new = here._replace(
-        ahead=jnp.where(better, ahead, here.x),
-        multipliers=jnp.where(met, here.multipliers, multipliers),
-        curvature=jnp.where(better, here.curvature, jnp.eye(d.shape[0], dtype=d.dtype)),
-        fresh=jnp.where(better, here.fresh, True),
-        price=_next_price(here.price, here.radius, program, d, multipliers),
-        radius=radius,
-        steps=state.steps + 1,
-        still=still,
-        status=status.astype(jnp.int32),
-    )
-    running = state.status == RUNNING
-    return jax.tree.map(lambda a, b: jnp.where(running, a, b), new, state)
+def _rows_of(ahead: tuple[Values, Derivatives], who: np.ndarray) -> tuple[Values, Derivatives]:
+    values, slopes = ahead
+    return Values(*(a[who] for a in values)), Derivatives(*(a[who] for a in slopes))
 
 
-def _scale(slopes: Values) -> Values:
-    """Largest components of the gradients at the start, kept from being tiny where a constraint just looks flat."""
-
-    def largest(gradient: Array, least: float) -> Array:
-        size = jnp.abs(gradient).max(axis=-1, initial=0.0)
-        return jnp.where(size > 0, jnp.maximum(size, least), 1.0)
-
-    return Values(largest(slopes.cost, 0.0), largest(slopes.vanish, 1e-2), largest(slopes.below, 1e-2))
-
-
-def residual(now: Values) -> Array:
-    """Largest violation of a constraint (last axis), in the user's units."""
-    return jnp.maximum(jnp.abs(now.vanish).max(axis=-1, initial=0.0), now.below.max(axis=-1, initial=0.0))
-
-
-def _finite(*values: Values) -> Array:
-    return jnp.stack([jnp.isfinite(leaf).all() for leaf in jax.tree.leaves(values)]).all()
-
-
-def _program(problem: Subproblem, state: Iterate) -> Quadratic:
-    now, slopes, scale = state.now, state.slopes, state.scale
+def _begin(problem: Problem, x: np.ndarray, values: Values, slopes: Derivatives) -> Iterates:
+    """Before the first step. Scales are the largest derivatives by a variable that is not held."""
+    m, n = x.shape
+    finite = _finite(values, *slopes)
     free = problem.upper > problem.lower
-    rows = jnp.concatenate([slopes.vanish / scale.vanish[:, None], slopes.below / scale.below[:, None]])
-    low = jnp.maximum(problem.lower - state.x, -state.radius)
-    high = jnp.minimum(problem.upper - state.x, state.radius)
-    return Quadratic(
-        slope=jnp.where(free, slopes.cost / scale.cost, 0.0),
-        curvature=state.curvature,
-        rows=jnp.where(free[None], rows, 0.0),
-        offset=jnp.concatenate([now.vanish / scale.vanish, now.below / scale.below]),
-        vanish=jnp.arange(rows.shape[0]) < now.vanish.shape[0],
-        price=state.price,
-        low=jnp.where(free, low, -1.0),
-        high=jnp.where(free, high, 1.0),
+    steepest = np.abs(np.where(free & finite[:, None], slopes.gradient, 0.0)).max(1)
+    cost_scale = np.where(steepest > 0, steepest, 1.0)
+    steepest = np.abs(np.where((free & finite[:, None])[:, None], slopes.jacobian, 0.0)).max(2)
+    row_scale = np.where(steepest > 0, np.maximum(steepest, _LEAST_SCALE), 1.0)
+    q = row_scale.shape[1]
+    return Iterates(
+        x=x.copy(),
+        f=np.full(m, np.inf),
+        c=np.zeros((m, q)),
+        gradient=np.zeros((m, n)),
+        jacobian=np.zeros((m, q, n)),
+        cost_scale=cost_scale,
+        row_scale=row_scale,
+        hessian=np.tile(np.eye(n), (m, 1, 1)),
+        fresh=np.ones(m, bool),
+        damping=np.ones(m),
+        multipliers=np.zeros((m, q)),
+        penalty=np.zeros((m, q)),
+        restoring=np.zeros(m, bool),
+        step=np.zeros((m, n)),
+        reduction=np.zeros(m),
+        rounding=np.zeros(m),
+        here=np.full(m, np.inf),
+        trial=x.copy(),
+        chosen=np.ones(m, bool),
+        slope=np.full(m, np.inf),
+        steps=np.zeros(m, int),
+        stalled_steps=np.zeros(m, int),
+        arrived=np.zeros(m, bool),
+        restarts=np.zeros(m, int),
+        nearest=[None] * m,
+        status=np.where(finite, RUNNING, Status.NOT_FINITE),
+        equalities=problem.programs.equalities,
     )
 
 
-def _violations(offset: Array, vanish: Array) -> Array:
-    return jnp.where(vanish, jnp.abs(offset), jnp.maximum(offset, 0.0))
+def _finite(values: Values, gradient: np.ndarray, jacobian: np.ndarray) -> Bool[np.ndarray, " r"]:
+    parts = (values.cost[:, None], values.rows, gradient, jacobian.reshape(len(gradient), -1))
+    return np.stack([np.isfinite(part).all(1) for part in parts]).all(0)
 
 
-def _search(problem: Subproblem, state: Iterate, program: Quadratic, d: Array) -> tuple[Array, Array]:
-    """Point of least merit on line and arc, and whether it is good enough to go there.
+def _move(
+    problem: Problem,
+    run: Iterates,
+    to: np.ndarray,
+    values: Values,
+    gradient: np.ndarray,
+    jacobian: np.ndarray,
+    taken: np.ndarray,
+) -> None:
+    """Go to the trial points, measure the curvature on the way, and see who has arrived."""
+    before = _lagrangian_gradient(run, to)
+    change = run.trial[to] - run.x[to]
+    run.x[to], run.f[to], run.c[to] = run.trial[to], values.cost[taken], values.rows[taken]
+    run.gradient[to], run.jacobian[to] = gradient[taken], jacobian[taken]
+    # curvature of the Lagrangian, with the multipliers of the program that led here; held variables stay out of it
+    begun = run.steps[to] > 0
+    measured = begun & ~run.restoring[to]
+    turn = np.where(problem.upper > problem.lower, 1.0, 0.0)[to] * (_lagrangian_gradient(run, to) - before)
+    who = to[measured]
+    run.hessian[who], run.fresh[who] = update(run.hessian[who], run.fresh[who], change[measured], turn[measured])
+    run.damping[to], run.chosen[to] = 1.0, False
 
-    Once less is promised than the rounding of the merit, the whole arc is taken as long as the constraints hold.
+    short = begun & (np.abs(change).max(1, initial=0.0) < _STILL)
+    run.stalled_steps[to] = np.where(short, run.stalled_steps[to] + 1, 0)
+    run.status[to[run.stalled_steps[to] >= _PATIENCE]] = Status.STALLED
+    run.slope[to] = _stationarity(problem, run, to)
+    met = _met(problem, run, to)
+    run.status[to[met & run.arrived[to]]] = Status.CONVERGED
+    run.arrived[to] = met
+
+
+def _search(problem: Problem, run: Iterates, who: np.ndarray, ahead: np.ndarray) -> Int[np.ndarray, " f"]:
+    """Look for a better point between x and trial points that were not good enough; return those without one.
+
+    These begin again with a multiple of the identity as B, ten times larger at every failure in a row.
     """
-
-    def merit(x: Array) -> tuple[Array, Array, Array]:
-        now = problem.evaluate(x)
-        offset = jnp.concatenate([now.vanish / state.scale.vanish, now.below / state.scale.below])
-        value = now.cost / state.scale.cost + state.price * _violations(offset, program.vanish).sum()
-        return jnp.where(jnp.isfinite(value), value, jnp.inf), offset, residual(now)
-
-    lengths = jnp.asarray(LENGTHS, d.dtype)
-
-    def round_of(bend: Array, _: None) -> tuple[Array, tuple[Array, Array, Array]]:
-        a = lengths[:, None]
-        points = state.x[None] + a * d[None] + a * a * bend[None]
-        points = jnp.clip(points, problem.lower[None], problem.upper[None])
-        values, offsets, residuals = jax.vmap(merit)(points)
-        return _bend(state, program, d, offsets[0]), (points, values, residuals)
-
-    _, (points, values, residuals) = jax.lax.scan(round_of, jnp.zeros_like(d), None, length=2)
-    points, values, residuals = points.reshape(-1, d.shape[0]), values.reshape(-1), residuals.reshape(-1)
-    old = state.now.cost / state.scale.cost + state.price * _violations(program.offset, program.vanish).sum()
-    promised = -_model_change(program, d)
-    rounding = 100 * jnp.finfo(d.dtype).eps * (jnp.abs(state.now.cost / state.scale.cost) + state.price)
-    whole = len(LENGTHS)
-    holds = (residuals[whole] <= problem.tolerance) & (values[whole] <= old + rounding)
-    last = (promised <= rounding) & holds
-    k = jnp.where(last, whole, jnp.argmin(values))
-    lower = values[k] <= old - 1e-4 * jnp.tile(lengths, 2)[k] * promised
-    return points[k], jnp.isfinite(values[k]) & (lower | last)
+    lost = run.chosen[who]  # a chosen point where the derivatives are not finite
+    look = who[~lost]
+    trial, found = search(problem, run, look, ahead[~lost])
+    run.trial[look[found]] = trial[found]
+    run.chosen[look[found]] = True
+    failed = np.concatenate([who[lost], look[~found]])
+    run.status[failed[_met(problem, run, failed)]] = Status.CONVERGED
+    failed = failed[run.status[failed] == RUNNING]
+    run.damping[failed] = np.where(run.fresh[failed], 10 * run.damping[failed], 1.0)
+    run.hessian[failed] = run.damping[failed, None, None] * np.eye(run.x.shape[1])
+    run.fresh[failed], run.chosen[failed] = True, False
+    run.status[failed[run.damping[failed] > _MOST_DAMPING]] = Status.STALLED
+    return failed
 
 
-def _model_change(program: Quadratic, d: Array) -> Array:
-    after = _violations(program.rows @ d + program.offset, program.vanish).sum()
-    before = _violations(program.offset, program.vanish).sum()
-    return program.slope @ d + program.price * (after - before)
+def _solve(problem: Problem, run: Iterates, who: np.ndarray) -> None:
+    """Solve the quadratic programs at x, see who has arrived, and propose the full steps."""
+    low, high = problem.lower[who] - run.x[who], problem.upper[who] - run.x[who]
+    for i, below, above in zip(who, low, high, strict=True):
+        for attempt in range(2):
+            answer = solve_quadratic(
+                run.hessian[i], run.gradient[i], run.jacobian[i], run.c[i], run.equalities, below, above
+            )
+            if answer.solved or attempt:
+                break
+            run.hessian[i], run.fresh[i] = np.eye(len(below)), True  # B is of no use
+        if not answer.solved:
+            run.status[i] = Status.STALLED
+            continue
+        run.step[i], run.restoring[i] = np.clip(answer.d, below, above), not answer.feasible
+        if answer.feasible:
+            run.multipliers[i] = answer.multipliers
+            run.multipliers[i, run.equalities :] = np.maximum(answer.multipliers[run.equalities :], 0.0)
+    run.steps[who] += 1
+    size = np.abs(run.multipliers[who])
+    run.penalty[who] = np.maximum(size, 0.5 * (run.penalty[who] + size))
+    run.slope[who] = np.minimum(run.slope[who], _stationarity(problem, run, who))
+    near = np.abs(run.step[who]).max(1, initial=0.0) <= _ARRIVED
+    run.status[who[near & ~run.restoring[who] & _met(problem, run, who)]] = Status.CONVERGED
+
+    run.reduction[who] = predict(run, who)
+    run.here[who] = merit(run.f[who], run.c[who], run.penalty[who], run.restoring[who], run.equalities)
+    size = np.where(run.restoring[who], 0.0, np.abs(run.f[who]) + run.penalty[who].sum(1) + 1)
+    run.rounding[who] = 50 * problem.precision * size
+    run.trial[who] = np.clip(run.x[who] + run.step[who], problem.lower[who], problem.upper[who])
+    flat = run.restoring[who] & (-run.reduction[who] <= _FLAT * run.here[who]) & (run.status[who] == RUNNING)
+    for i in who[flat]:
+        _move_aside(problem, run, i)
 
 
-def _bend(state: Iterate, program: Quadratic, d: Array, offset: Array) -> Array:
-    """Shortest change that takes back, to first order, what the active constraints gained beyond their linear model.
-
-    Variables that the step has put onto a bound stay there.
-    """
-    linear = program.rows @ d + program.offset
-    excess = jnp.where(jnp.isfinite(offset), offset, linear) - linear
-    active = program.vanish | (linear > -1e-6)
-    edge = 1e-7 * (program.high - program.low)
-    inside = (d > program.low + edge) & (d < program.high - edge)
-    inside |= jnp.abs(d) >= 0.999 * state.radius
-    rows = jnp.where(active[:, None] & inside[None], program.rows, 0.0)
-    # (J^T J + small)^-1 J^T: as the rows can be many or dependent, in the space of the variables
-    gram = rows.T @ rows
-    small = 1e-9 if d.dtype == jnp.float64 else 1e-4
-    gram = gram + small * (jnp.trace(gram) + small) * jnp.eye(d.shape[0], dtype=d.dtype)
-    return -solve_factored(factor(gram), rows.T @ jnp.where(active, excess, 0.0))
-
-
-def _lagrangian_slope(state: Iterate) -> Array:
-    vanish, below = state.scale.vanish, state.scale.below
-    rows = jnp.concatenate([state.slopes.vanish / vanish[:, None], state.slopes.below / below[:, None]])
-    return state.slopes.cost / state.scale.cost + state.multipliers @ rows
+def _move_aside(problem: Problem, run: Iterates, i: int) -> None:
+    """Leave a local least of the violations, unless that has been done too often."""
+    found = float(largest_violation(run.c[i] * run.row_scale[i], run.equalities))
+    nearest = run.nearest[i]
+    if nearest is None or found < nearest[0]:
+        run.nearest[i] = found, run.x[i].copy(), float(run.f[i]), run.c[i].copy()
+    if run.restarts[i] >= RESTARTS:
+        run.status[i] = Status.INFEASIBLE
+        return
+    free = problem.upper[i] > problem.lower[i]
+    reach = np.where(free, np.minimum(problem.upper[i] - problem.lower[i], 1.0), 0.0)
+    aside = np.random.default_rng(run.restarts[i]).uniform(-1, 1, reach.shape)
+    run.trial[i] = np.clip(run.x[i] + ASIDE * reach * aside, problem.lower[i], problem.upper[i])
+    run.hessian[i], run.fresh[i] = np.eye(len(reach)), True
+    run.multipliers[i] = run.penalty[i] = 0.0
+    run.chosen[i] = True
+    run.restarts[i] += 1
 
 
-def _slope(problem: Subproblem, state: Iterate, gradient: Array) -> Array:
-    """Largest component of the Lagrangian's gradient that does not press against a bound, and of complementarity."""
-    pressed = state.x - jnp.clip(state.x - gradient, problem.lower, problem.upper)
-    count = state.now.vanish.shape[0]
-    loose = jnp.minimum(state.multipliers[count:], -state.now.below / state.scale.below)
-    return jnp.maximum(jnp.abs(pressed).max(), jnp.maximum(loose, 0.0).max(initial=0.0))
+def _return_to_nearest(run: Iterates) -> None:
+    """Starts that were moved aside and found nothing better end where violations were least."""
+    for i, nearest in enumerate(run.nearest):
+        if nearest is not None and run.status[i] != Status.CONVERGED and nearest[0] < run.violation[i]:
+            _, run.x[i], run.f[i], run.c[i] = nearest
 
 
-def _measure(state: Iterate, s: Array, y: Array, useful: Array) -> tuple[Array, Array]:
-    """Damped BFGS update, if `useful`; the first one also sets the size."""
-    square = s @ s
-    eps = jnp.finfo(s.dtype).eps
-    useful &= jnp.isfinite(y).all() & (square > eps**2)
-    s, y = (jnp.where(useful, v, jnp.zeros_like(v)) for v in (s, y))
-    size = jnp.clip(jnp.where(useful, jnp.abs(s @ y) / jnp.where(useful, square, 1.0), 1.0), 1e-3, 1e3)
-    B = jnp.where(state.fresh & useful, size * jnp.eye(s.shape[0], dtype=s.dtype), state.curvature)
-    Bs = B @ s
-    sBs = s @ Bs
-    sy = s @ y
-    damp = jnp.where(sy >= 0.2 * sBs, 1.0, 0.8 * sBs / jnp.where(sy >= 0.2 * sBs, 1.0, sBs - sy))
-    r = damp * y + (1 - damp) * Bs
-    sr = s @ r
-    safe = useful & (sr > 0) & (sBs > 0)
-    change = r[:, None] * r[None] / jnp.where(safe, sr, 1.0) - Bs[:, None] * Bs[None] / jnp.where(safe, sBs, 1.0)
-    return jnp.where(safe, B + change, B), state.fresh & ~useful
+def _lagrangian_gradient(run: Iterates, who: np.ndarray) -> Float[np.ndarray, "r n"]:
+    return run.gradient[who] + (run.multipliers[who][:, None] @ run.jacobian[who])[:, 0]
 
 
-def _next_price(price: Array, radius: Array, program: Quadratic, d: Array, multipliers: Array) -> Array:
-    """Raise the price while the program buys violations off; let it come down towards the multipliers."""
-    before = _violations(program.offset, program.vanish).sum()
-    after = _violations(program.rows @ d + program.offset, program.vanish).sum()
-    largest = jnp.abs(multipliers).max(initial=0.0)
-    hemmed = jnp.abs(d).max() > 0.99 * radius  # a small radius alone keeps it from the constraints
-    bought = (after > 0.3 * before) & (largest > 0.9 * price) & ((price < _HEMMED_PRICE) | ~hemmed)
-    lower = jnp.maximum(0.7 * price, jnp.maximum(2 * largest, 1.0))
-    return jnp.clip(jnp.where(bought, 4 * price, lower), 1e-3, _LARGEST_PRICE)
+def _stationarity(problem: Problem, run: Iterates, who: np.ndarray) -> Float[np.ndarray, " r"]:
+    gradient, slack = _lagrangian_gradient(run, who), -run.c[who, run.equalities :]
+    box = problem.lower[who], problem.upper[who]
+    return stationarity(run.x[who], gradient, run.multipliers[who, run.equalities :], slack, *box)
+
+
+def _met(problem: Problem, run: Iterates, who: np.ndarray) -> Bool[np.ndarray, " r"]:
+    """Whether both tolerances are met at x."""
+    worst = largest_violation(run.c[who] * run.row_scale[who], run.equalities)
+    return (worst <= problem.tolerance) & (run.slope[who] <= problem.slope_tolerance)

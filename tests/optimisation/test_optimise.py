@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from reojax.design import descend, optimise
-from reojax.optimisation import optimise as solver
 
 STARTS = np.random.default_rng(0).uniform(1, 5, (8, 4))
 
@@ -133,26 +132,22 @@ def test_single_precision():
     np.testing.assert_allclose(found.cost[found.best], 17.0140172, rtol=1e-4)
 
 
-def test_no_lapack():
-    """Batched LAPACK calls can deadlock on CPU."""
-    functions = solver._Functions(product_cost, forty, at_least_25, False)
-    ends = {"lower": np.full(4, 1.0), "upper": np.full(4, 5.0), "size": np.full(4, 4.0)}
-    fixed = solver._Fixed(**ends, tolerance=np.float64(1e-8), slope_tolerance=np.float64(1e-6))
-    state = jax.eval_shape(lambda x: solver._begin(functions, x, None, fixed), STARTS)
-    text = (
-        solver._advance.trace(functions, state, None, fixed, np.int32(1)).lower(lowering_platforms=("cpu",)).as_text()
-    )
-    assert "stablehlo.while" in text
-    assert "lapack_" not in text
+def test_nothing_is_compiled_or_traced_twice():
+    """The functions are not called again for other starts, fewer, or other data of the same types."""
+    calls = []
 
+    def counted(x, data):
+        calls.append(1)
+        return ((x - data) ** 2).sum()
 
-def test_nothing_is_compiled_twice():
-    optimise(product_cost, STARTS, **HS71)
-    with jax.log_compiles(), pytest.MonkeyPatch.context() as patch:
-        messages = []
-        patch.setattr("logging.Logger.handle", lambda self, record: messages.append(record.getMessage()))
-        optimise(product_cost, STARTS + 0.0, **HS71)
-    assert not [m for m in messages if "Compiling" in m and "_advance" in m]
+    centres = np.linspace(0.2, 0.8, 27).reshape(9, 3)
+    optimise(counted, centres, lower=0, upper=1, data=centres + 0.1)
+    assert calls
+    before = len(calls)
+    for count in (9, 8):
+        found = optimise(counted, centres[:count], lower=-1, upper=1, data=centres[:count])
+        assert found.converged.all()
+    assert len(calls) == before
 
 
 def test_descent_in_a_box_with_a_kink():
