@@ -18,7 +18,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._internal.arrays import Array, is_concrete
+from reojax._internal import checks
+from reojax._internal.arrays import Array
 from reojax.mechanics.curvature import curvature_terms
 from reojax.mechanics.input_checks import check_motion
 from reojax.robot import Robot
@@ -66,11 +67,11 @@ def controllable_directions(
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite, or there is no such joint.
     """
-    if not is_concrete((robot, theta)):
-        raise ValueError("`robot` or `theta` is traced; a rank is decided on the host, outside of jit, vmap and grad.")
+    checks.on_host("robot` or `theta", (robot, theta), "what decides a rank")
     check_motion(robot, theta=theta)
     theta = np.asarray(theta, float)
-    moves = independent_moves(robot, joint_numbers(robot, joints))
+    chosen = range(robot.joints) if joints is None else checks.indices_of("joints", joints, robot.joint_names, "joint")
+    moves = independent_moves(robot, chosen)
     count = moves.shape[1]
     if count < 2:
         return ControllableDirections(0, np.zeros((0, 3)))
@@ -104,30 +105,6 @@ def controllable_directions(
     if _turns_across(here, seen, np.stack([turn.as_rotvec() for turn in turned]), tolerance):
         return ControllableDirections(3, _principal(carried[seen]))
     return _span(carried[seen], size[seen], tolerance)
-
-
-def joint_numbers(robot: Robot, joints: Sequence[int | str] | None, entry: str = "joints") -> tuple[int, ...]:
-    """Numbers of joints that are given by number or name, in ascending order; None stands for all.
-
-    Raises:
-        ValueError: naming the joint that the robot does not have, or that is named twice.
-    """
-    if joints is None:
-        return tuple(range(robot.joints))
-    if isinstance(joints, str | int | np.integer):
-        joints = [joints]  # type: ignore[list-item]
-    numbers = []
-    for joint in joints:
-        if isinstance(joint, str):
-            if joint not in robot.joint_names:
-                raise ValueError(f"`{entry}` names {joint!r}; {robot.name!r} has {', '.join(robot.joint_names)}.")
-            joint = robot.joint_names.index(joint)
-        elif isinstance(joint, bool) or not isinstance(joint, int | np.integer) or not 0 <= joint < robot.joints:
-            raise ValueError(f"`{entry}` has {joint!r}; {robot.name!r} has joints 0 to {robot.joints - 1}, or names.")
-        if int(joint) in numbers:
-            raise ValueError(f"`{entry}` has joint {robot.joint_names[joint]!r} twice.")
-        numbers.append(int(joint))
-    return tuple(sorted(numbers))
 
 
 def independent_moves(robot: Robot, joints: Sequence[int]) -> Float[np.ndarray, "j k"]:

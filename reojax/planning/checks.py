@@ -14,15 +14,22 @@ OBJECTIVES = ("count", "travel")
 
 
 def key_of(robot: Robot) -> Hashable:
-    """Return what a robot is, down to the last bit, as a key to keep things under."""
-    leaves, structure = jax.tree.flatten(robot)
-    return structure, *(np.asarray(leaf).tobytes() for leaf in leaves)
+    """Return what a robot is, down to the last bit, as a key to keep things under; names do not count."""
+    leaves = (np.asarray(leaf) for leaf in jax.tree.leaves(robot))
+    numbers = ((leaf.dtype.str, leaf.shape, leaf.tobytes()) for leaf in leaves)
+    structure = robot.parent, robot.rotor_on, robot.capsule_link, robot.collision_pairs, robot.couplings, robot.layout
+    return structure, *numbers
+
+
+def a_robot(robot: Any) -> None:
+    """Refuse what is no robot of concrete numbers."""
+    instance("robot", robot, Robot, "`make_robot` makes")
+    on_host("robot", robot, "planning")
 
 
 def robot_and_layout(robot: Any, layout: Layout | None) -> Layout:
     """Return the layout, by default the robot's own."""
-    instance("robot", robot, Robot, "`make_robot` makes")
-    on_host("robot", robot, "planning")
+    a_robot(robot)
     if layout is None:
         layout = layout_of(robot)
     check_layout(layout)

@@ -1,219 +1,278 @@
-"""Free closed paths: one closed polygon within the joint limits that ends on the target, with little joint travel.
-
-For each target, random polygons which end near it are improved side by side by `design.optimise`: first with their
-joint travel rounded off generously, then the best of them once more with hardly any rounding. They are solved with
-few integration steps; what those miss of the true net rotation is added to the target, and they are solved again,
-until the true one is on it.
-"""
+"""Free paths: one polygon within the joint limits of any robot that ends on a target, with little joint travel."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.manoeuvres import Layout
-from reojax.optimisation.optimise import optimise
 from reojax.planning import quaternions
-from reojax.planning.checks import robot_and_layout
-from reojax.planning.free_polygons import Polygons, PolygonTable, family_of
-from reojax.planning.words import box_of
+from reojax.planning.checks import a_robot, key_of, robot_and_layout
+from reojax.planning.free_polygons import polygons_of
+from reojax.planning.free_search import Search, apart
+from reojax.planning.freedom import Freedom, freedom_of
+from reojax.planning.polygon_table import table_of
+from reojax.planning.reach import Reach, reach_of
+from reojax.planning.repeats import MOST_REPEATS, least_repeats, repeated
+from reojax.planning.words import box_of, fold_angles
 from reojax.robot import Robot
 
-_ROWS = 32
-"""Polygons solved side by side: one shape, one program."""
-_ROUNDS = 3
-"""How often starts are tried for targets that are not reached."""
-_FINALISTS = 2
-"""Polygons of each target that are improved to the end."""
-_ROUND, _SHARP = 0.1, 0.01
-"""Rounding of the joint travel on each edge [rad], at first and at the end."""
-_SLOPE = 3e-3
-"""Slope, as in `design.Solution`, at which the search for less joint travel stops."""
-_EXACT = {8: 1e-10, 4: 1e-5}
-"""Miss [rad] that the solver goes for, by the bytes of a number."""
-_REACHED, _NEAR = 1e3, 1e7
-"""How many times that much counts as on the target for the time being, and how many as near to it."""
-_LAST = 4
-"""How often, at most, the target is shifted to bring the true rotation onto it."""
-_ANY = 1e6
-"""Slope that stops the solver as soon as the target is met."""
-_OFF = 1e6
-"""Joint travel [rad] that is worse than any."""
+_CORNERS = ((4, 8), (8, 6), (10**9, 5))
+"""Free corners by default, up to so many moving joints. Three make a rectangle; each further one costs as many
+variables as joints move, and robots of many joints have loops enough of few corners."""
 
 
 class FreePaths(NamedTuple):
-    """Closed polygons, one for each target; of `free_path` one, without the leading axis."""
+    """Polygons, one for each target; of `free_path` one, without the leading axis."""
 
     waypoints: Float[np.ndarray, "*m v j"]
-    """Corners of the joint paths [rad], both ends at zero, for `polygon`."""
+    """Corners of the joint path of one run [rad], from `start` to `end`, for `polygon`."""
     rotation: Float[np.ndarray, "*m 3 3"]
-    """Net rotation of the base after each."""
+    """Rotation of the base after all runs."""
     error: Float[np.ndarray, "*m"]
     """Angle left to the target [rad]."""
     travel: Float[np.ndarray, "*m"]
-    """Sum over all joints of the angle each one moves through [rad]."""
+    """Sum over all joints of the angle each one moves through, in all runs [rad]."""
+    repeats: Int[np.ndarray, "*m"]
+    """How often the path is run."""
     converged: Bool[np.ndarray, "*m"]
     """Whether `error` is within the tolerance; the travel is then the least found, not proven to be the least."""
+    status: Any
+    """In words: converged; not found, which proves nothing; or unreachable in principle, and why. (m,) of many."""
+    clearance: Any
+    """Least distance of the robot's parts along the path, proven [m], (m,) of many; None if it was not asked for."""
 
 
-def free_path(robot: Robot, target: ArrayLike, **options: Any) -> FreePaths:
-    """Find a closed polygon of little joint travel after which the base has turned by `target` (3, 3).
+def free_path(
+    robot: Robot,
+    target: Float[Array, "3 3"] | ArrayLike,
+    *,
+    start: ArrayLike | None = None,
+    end: ArrayLike | None = None,
+    joints: Sequence[int | str] | None = None,
+    lower: ArrayLike | None = None,
+    upper: ArrayLike | None = None,
+    repeats: int | Literal["least"] = 1,
+    twist_limit: float | None = None,
+    bend_limit: float | None = None,
+    layout: Layout | None = None,
+    corners: int | None = None,
+    starts: int = 8,
+    tolerance: float = 1e-9,
+    max_steps: int = 100,
+    seed: int = 0,
+    progress: bool = False,
+) -> FreePaths:
+    """Find a joint path of little travel after which the base has turned by `target` (3, 3); any tree robot.
 
-    Options and errors as for `free_paths`.
+    `free_paths` for one target: arguments and errors are explained there.
     """
-    many = free_paths(robot, checks.rotations("target", target, (3, 3))[None], **options)
-    return FreePaths(*(field[0] for field in many))
+    many = free_paths(
+        robot,
+        checks.rotations("target", target, (3, 3))[None],
+        start=start,
+        end=end,
+        joints=joints,
+        lower=lower,
+        upper=upper,
+        repeats=repeats,
+        twist_limit=twist_limit,
+        bend_limit=bend_limit,
+        layout=layout,
+        corners=corners,
+        starts=starts,
+        tolerance=tolerance,
+        max_steps=max_steps,
+        seed=seed,
+        progress=progress,
+    )
+    one: dict[str, Any] = {name: None if field is None else field[0] for name, field in many._asdict().items()}
+    one["status"] = str(one["status"])
+    return FreePaths(**one)
 
 
 def free_paths(
     robot: Robot,
     targets: Float[Array, "m 3 3"] | ArrayLike,
     *,
-    twist_limit: float,
-    bend_limit: float,
-    corners: int = 8,
-    starts: int = 8,
+    start: ArrayLike | None = None,
+    end: ArrayLike | None = None,
+    joints: Sequence[int | str] | None = None,
+    lower: ArrayLike | None = None,
+    upper: ArrayLike | None = None,
+    repeats: int | Literal["least"] = 1,
+    twist_limit: float | None = None,
+    bend_limit: float | None = None,
     layout: Layout | None = None,
+    corners: int | None = None,
+    starts: int = 8,
     tolerance: float = 1e-9,
     max_steps: int = 100,
     seed: int = 0,
     progress: bool = False,
 ) -> FreePaths:
-    """Find closed polygons of little joint travel after which the base has turned by the targets.
+    """Find joint paths of little travel after which the base has turned by the targets; any tree robot.
 
-    Local: more `starts` find less travel. Runs on the host, many polygons side by side.
+    The path is a polygon with `corners` free corners between two postures. Coupled joints follow their drivers; all
+    joints stay within their limits at the corners and so along the straight edges between them. Local: more `starts`
+    find less travel. Computes in float64 on the host, whatever JAX's default, many polygons side by side.
 
     Args:
-        robot: the robot. Joints that neither twist, bend nor fold stay at zero.
-        targets: (m, 3, 3) rotations of the base, final base components to initial ones.
-        twist_limit: largest angle of the distal joints, either way [rad]. The robot's own joint limits hold too.
+        robot: the robot.
+        targets: (m, 3, 3) rotations of the base after all runs, final base components to initial ones.
+        start: (j,) posture before the path [rad]; default zero. Joints that may not move stay there.
+        end: (j,) posture after it [rad]; default `start`.
+        joints: numbers or names of the joints that may move; default all.
+        lower: number or (j,), lower limits narrower than the robot's own [rad]. A joint without any limit stays
+            within half a turn of its angles at `start` and `end`.
+        upper: number or (j,), upper limits, likewise.
+        repeats: how often the path is run, from 1 to 1 000 000; or "least" for the least number of runs that is found
+            to reach the target. More than one run needs a closed path.
+        twist_limit: with `bend_limit`, in place of `joints`, `lower` and `upper`, for robots with a layout: largest
+            angle of the distal joints, either way [rad]. Only they and the centre joint move, feet folded meanwhile.
         bend_limit: largest angle of the centre joint, either way [rad].
-        corners: number of free corners, at least 2; more find less travel and take longer.
+        layout: which joints twist, bend and fold, for these two limits; default the robot's own.
+        corners: number of free corners, at least 2; more find less travel and take longer. Default 8 for up to 4
+            moving joints, 6 for up to 8, else 5.
         starts: polygons to start from for each target; up to three times as many if it is not reached.
-        layout: which joints twist, bend and fold; default by the robot's number of joints.
         tolerance: angle to the target that counts as reached [rad].
         max_steps: most steps of the solver.
         seed: of the random polygons.
         progress: whether to show a bar on stderr.
 
     Returns:
-        The paths. Where a target is not reached, the closest path found, with `converged` False. The identity gives
-        the path that stays at zero.
+        The paths. Where a target is not reached, the closest path found, with `converged` False and the reason in
+        `status`. The identity gives the path that stays put, where `end` is `start`.
 
     Raises:
-        ValueError: naming the entry, if a target is no rotation or an option makes no sense.
+        ValueError: naming the entry, if a target is no rotation, a posture is outside of the limits, a joint unknown,
+            or an option makes no sense.
     """
-    layout = robot_and_layout(robot, layout)
+    a_robot(robot)
     given = checks.rotations("targets", targets, (-1, 3, 3))
-    twist_limit, bend_limit = checks.positive("twist_limit", twist_limit), checks.positive("bend_limit", bend_limit)
-    corners, starts = checks.whole("corners", corners, 2), checks.whole("starts", starts)
     tolerance, max_steps = checks.positive("tolerance", tolerance), checks.whole("max_steps", max_steps)
-    box = box_of(robot, layout, "R", twist_limit, bend_limit)
-    polygons, pool = family_of(robot, layout, box, corners, checks.whole("seed", seed, 0))
-    wanted = quaternions.to_matrices(quaternions.from_matrices(given))
-    exact = _EXACT[jax.dtypes.canonicalize_dtype(float).itemsize]
-    with _bar(progress) as bar:
-        solver = _Solver(polygons, pool, min(_ROWS, len(wanted) * starts), exact, bar)
-        x = _shortest(solver, _first(solver, wanted, starts, max_steps), wanted, max_steps, tolerance)
-    paths, rotation = polygons.paths(x), polygons.rotations(x)
-    still = _apart(np.eye(3), wanted) <= tolerance
-    paths[still], rotation[still] = 0.0, np.eye(3)
-    error = _apart(rotation, wanted)
-    return FreePaths(paths, rotation, error, np.abs(np.diff(paths, axis=1)).sum((1, 2)), error <= tolerance)
+    starts, seed = checks.whole("starts", starts), checks.whole("seed", seed, 0)
+    if corners is not None:
+        corners = checks.whole("corners", corners, 2)
+    if repeats != "least" or not isinstance(repeats, str):
+        repeats = checks.whole("repeats", repeats, 1, MOST_REPEATS)
+    if twist_limit is None and bend_limit is None and layout is None:
+        before = np.zeros((0, robot.joints))
+        freedom = freedom_of(robot, start=start, end=end, joints=joints, lower=lower, upper=upper)
+    else:
+        others = {"start": start, "end": end, "joints": joints, "lower": lower, "upper": upper}
+        before, freedom = _by_layout(robot, layout, twist_limit, bend_limit, others)
+    if repeats != 1 and not freedom.closed:
+        raise ValueError(f"`repeats` is {repeats!r} and `end` is not `start`; only a closed path can be run again.")
+
+    with jax.enable_x64(True):
+        robot = jax.tree.map(lambda leaf: np.asarray(leaf, float), robot)
+        return _solve(robot, given, freedom, before, repeats, corners, starts, tolerance, max_steps, seed, progress)
 
 
-class _Solver(NamedTuple):
-    """What all solutions of one call share."""
+def _solve(
+    robot: Robot,
+    targets: np.ndarray,
+    freedom: Freedom,
+    before: np.ndarray,
+    repeats: int | str,
+    corners: int | None,
+    starts: int,
+    tolerance: float,
+    max_steps: int,
+    seed: int,
+    progress: bool,
+) -> FreePaths:
+    count = len(freedom.joints)
+    corners = corners or next(number for most, number in _CORNERS if count <= most)
+    polygons = polygons_of(robot, freedom, corners)
+    table = table_of(polygons, freedom, key_of(robot), seed)
+    reach = reach_of(robot, freedom, polygons, table.turns)
+    fold = _fold_rotation(polygons, before, corners)
+    wanted = quaternions.to_matrices(quaternions.from_matrices(targets))
+    inside = fold.T @ wanted @ fold
+    possible = reach.closest(inside)
+    still = apart(np.broadcast_to(reach.straight, inside.shape), possible) <= tolerance
 
-    polygons: Polygons
-    pool: PolygonTable
-    rows: int
-    exact: float
-    bar: Any
-
-    def __call__(
-        self, x: np.ndarray, targets: np.ndarray, rounding: float, steps: int, slope: float = _SLOPE
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Improve polygons (m, n) for targets (m, 3, 3): the polygons, their misses and their travel (m,)."""
-        parts = [(x[:0], np.zeros(0), np.zeros(0))]
-        self.bar.total += len(x)
-        for first in range(0, len(x), self.rows):
-            take = np.minimum(np.arange(first, first + self.rows), len(x) - 1)
-            found = optimise(
-                self.polygons.travel,
-                x[take],
-                lower=self.pool.low,
-                upper=self.pool.high,
-                equality=self.polygons.miss,
-                data=(targets[take], np.full(self.rows, rounding)),
-                tolerance=self.exact,
-                slope_tolerance=slope,
-                max_steps=steps,
-            )
-            size = min(self.rows, len(x) - first)
-            parts.append((found.value[:size], found.residual[:size], found.cost[:size]))
-            self.bar.update(size)
-        value, miss, cost = map(np.concatenate, zip(*parts, strict=True))
-        return value, miss, cost
-
-
-def _first(solver: _Solver, targets: np.ndarray, starts: int, max_steps: int) -> np.ndarray:
-    """Polygons (m, f, n) for each target: of those from so many starts the ones of least travel, or the closest."""
-    tried = np.array([solver.pool.near(target, _ROUNDS * starts) for target in targets])
-    worth = np.full(tried.shape[:2], np.inf)
-    for first in range(0, tried.shape[1], starts):
-        waiting = np.flatnonzero(worth.min(1) >= _OFF)
-        if not len(waiting):
-            break
-        x = tried[waiting, first : first + starts]
-        owner, shape = np.repeat(waiting, x.shape[1]), x.shape
-        x, miss, travel = solver(x.reshape(len(owner), -1), targets[owner], _ROUND, max_steps)
-        tried[waiting, first : first + starts] = x.reshape(shape)
-        worth[waiting, first : first + starts] = _worth(miss, travel, _REACHED * solver.exact).reshape(shape[:2])
-    return np.take_along_axis(tried, worth.argsort(1)[:, :_FINALISTS, None], 1)
-
-
-def _shortest(solver: _Solver, found: np.ndarray, targets: np.ndarray, max_steps: int, tolerance: float) -> np.ndarray:
-    """The best polygon (m, n) of some for each target, once they are improved to the end."""
-    polygons, shape = solver.polygons, found.shape[:2]
-    wanted = np.repeat(targets, shape[1], axis=0)
-    x, aim = found.reshape(len(wanted), -1), wanted.copy()
-    turned = polygons.rotations(x)
-    error = _apart(turned, wanted)
-    for k in range(_LAST + 1):
-        near = error < _NEAR * solver.exact
-        going = np.flatnonzero(near & (error > 0.5 * tolerance)) if k else np.arange(len(x))
-        shift = wanted[going] @ turned[going].swapaxes(1, 2)
-        new = np.where(near[going, None, None], shift @ aim[going], wanted[going])
-        moved, _, _ = solver(x[going], new, _SHARP, max_steps, _ANY if k else _SLOPE)
-        now = polygons.rotations(moved)
-        off = _apart(now, wanted[going])
-        better = off < np.maximum(error[going], 0.0 if k else _REACHED * solver.exact)
-        for old, change in ((x, moved), (aim, new), (turned, now), (error, off)):
-            old[going[better]] = change[better]
-    paths = polygons.paths(x)
-    worth = _worth(error, np.abs(np.diff(paths, axis=1)).sum((1, 2)), tolerance).reshape(shape)
-    return np.take_along_axis(x.reshape(*shape, -1), worth.argmin(1)[:, None, None], 1)[:, 0]
+    x, runs = np.zeros((len(inside), corners * count + 1)), np.ones(len(inside), int)
+    moving = np.flatnonzero(~still)
+    if len(moving):
+        search = Search(polygons, table, freedom, starts, max_steps, tolerance)
+        with search.bar(progress):
+            if repeats == "least":
+                x[moving], runs[moving] = least_repeats(search, possible[moving])
+            else:
+                runs[moving] = repeats
+                x[moving] = repeated(search, possible[moving], runs[moving])
+    paths = polygons.paths(x, freedom)
+    paths[still] = np.where(np.arange(corners + 2)[:, None] <= corners, freedom.start, freedom.end)
+    one = quaternions.from_matrices(polygons.rotations(paths))
+    rotation = fold @ quaternions.to_matrices(quaternions.power(one, runs)) @ fold.T
+    rotation[still] = fold @ reach.straight @ fold.T
+    error = apart(rotation, wanted)
+    beyond = apart(possible, inside)
+    ends = (np.repeat(part[None], len(paths), 0) for part in (before, before[::-1]))
+    paths = np.concatenate([next(ends), paths, next(ends)], axis=1)
+    if len(before):
+        paths[still] = 0.0
+    return FreePaths(
+        waypoints=paths,
+        rotation=rotation,
+        error=error,
+        travel=np.abs(np.diff(paths, axis=1)).sum((1, 2)) * runs,
+        repeats=runs,
+        converged=error <= tolerance,
+        status=np.array([_status(*row, tolerance, reach) for row in zip(error, beyond, strict=True)]),
+        clearance=None,
+    )
 
 
-def _worth(miss: np.ndarray, travel: np.ndarray, tolerance: float) -> np.ndarray:
-    """What is made least: the travel of polygons that reach their targets, before the miss of those that do not."""
-    return np.where(miss <= tolerance, travel, _OFF * (1 + miss))
+def _status(error: float, beyond: float, tolerance: float, reach: Reach) -> str:
+    if error <= tolerance:
+        return "converged"
+    if beyond > tolerance:
+        return f"unreachable: {reach.explain()}; {np.rad2deg(beyond):.6g} deg are left at the least"
+    return (
+        f"not found: the closest path leaves {np.rad2deg(error):.6g} deg, which proves nothing; more repeats, corners "
+        "or starts, or wider limits, may reach it"
+    )
 
 
-def _apart(turned: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Angles (m,) between rotations [rad]."""
-    p, q = (quaternions.from_matrices(np.broadcast_to(r, wanted.shape)) for r in (turned, wanted))
-    return quaternions.angles(quaternions.product(quaternions.inverse(p), q))
+def _fold_rotation(polygons: Any, before: np.ndarray, corners: int) -> np.ndarray:
+    """Rotation of the base while the feet fold, before the polygon."""
+    if not len(before):
+        return np.eye(3)
+    folding = np.concatenate([before, np.repeat(before[-1:], corners, axis=0)])
+    return polygons.rotations(folding[None])[0]
 
 
-def _bar(show: bool) -> Any:
-    from tqdm import tqdm
-
-    return tqdm(total=0, disable=not show, unit=" polygons", desc="free paths")
+def _by_layout(
+    robot: Robot,
+    layout: Layout | None,
+    twist_limit: float | None,
+    bend_limit: float | None,
+    others: dict[str, Any],
+) -> tuple[np.ndarray, Freedom]:
+    """Corners before the polygon, and its freedom, where the limits are those of the parts of a layout."""
+    for entry, value in others.items():
+        if value is not None:
+            raise ValueError(f"`{entry}` is given with `twist_limit`, `bend_limit` or `layout`; give one or the other.")
+    for entry, value in (("twist_limit", twist_limit), ("bend_limit", bend_limit)):
+        if value is None:
+            raise ValueError(f"`{entry}` is missing: limits by layout need both `twist_limit` and `bend_limit`.")
+    layout = robot_and_layout(robot, layout)
+    twist, bend = checks.positive("twist_limit", twist_limit), checks.positive("bend_limit", bend_limit)
+    box = box_of(robot, layout, "R", twist, bend)
+    lower, upper = np.full(robot.joints, -np.inf), np.full(robot.joints, np.inf)
+    moving = [layout.twist[0], layout.bend, layout.twist[1]]
+    lower[moving], upper[moving] = box.low[0], box.high[0]
+    rest = fold_angles(layout)
+    before = np.stack([0 * rest, rest])[:-1] if layout.fold else np.zeros((0, robot.joints))
+    return before, freedom_of(robot, start=rest, end=None, joints=moving, lower=lower, upper=upper)

@@ -1,15 +1,15 @@
-"""Closed polygons within the joint limits: their travel, what they miss a target by, and random ones to start from.
+"""Polygons in shape space as functions of their free corners: travel, rotation, and what they miss a target by.
 
-A polygon is the vector of its free corners, each the angles of the joints that twist and bend. Robots with feet fold
-them before the polygon and unfold them after it, as they do for words. Joint travel has a kink wherever a joint rests
-on an edge; while searching it is rounded off, `|d|` of an edge becoming `sqrt(d^2 + r^2) - r`.
+The variables x are the free corners, each the angles of the independent joints that move, and one angle more: `turn`,
+by which the target is turned on about an axis. It is held at zero while a target is sought, and made largest to find
+out how far one loop can turn about that axis. Joint travel has a kink wherever a joint rests on an edge; while
+searching it is rounded off, `|d|` of an edge becoming `sqrt(d^2 + r^2) - r`.
 """
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable, Hashable
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Callable
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,142 +18,93 @@ from jaxtyping import Float
 
 from reojax import so3
 from reojax._internal.arrays import Array
-from reojax.manoeuvres import Layout
 from reojax.mechanics.holonomy import net_rotation
 from reojax.path import Path
-from reojax.planning import quaternions
 from reojax.planning.checks import key_of
-from reojax.planning.words import AmplitudeBox, fold_angles
+from reojax.planning.freedom import Freedom
+from reojax.planning.store import Store
 from reojax.robot import Robot
 
 COARSE, FINE = 2, 8
-"""Steps per edge while searching, and when judging."""
-_RANDOM = 4096
-"""Random polygons of either kind that starts are taken from."""
-_CALL = 64
+"""Steps per edge while searching, and when judging: on the prototype within 270 degrees the coarse ones miss the true
+rotation by some 1e-5, which the last solutions make up for, the fine ones by 1e-13."""
+_CALL = 256
 """Polygons whose rotations are computed together."""
-_PRICE = 60.0
-"""Travel that a radian of distance to the target counts for among them [rad]."""
 _KEPT = 8
-"""Robots and boxes that are kept."""
-_Kept = TypeVar("_Kept")
+"""Robots and joints whose programs are kept."""
+
+
+class Aim(NamedTuple):
+    """What one polygon is solved for."""
+
+    target: Float[Array, "3 3"]
+    """Rotation to reach."""
+    axis: Float[Array, "3"]
+    """Axis about which `turn` is added to it."""
+    ends: Float[Array, "2 j"]
+    """Postures at the start and at the end."""
+    rounding: Float[Array, ""]
+    """Rounding of the travel on each edge [rad]."""
+    far: Float[Array, ""]
+    """0 where travel is made least, 1 where `turn` is made largest."""
 
 
 class Polygons(NamedTuple):
-    """The closed polygons of one robot, as functions of their corners x (n,)."""
+    """The polygons of one robot's joints with so many free corners."""
 
-    paths: Callable[[np.ndarray], np.ndarray]
-    """Whole joint paths (m, v, j), both ends at zero, of polygons (m, n)."""
-    rotations: Callable[[np.ndarray], np.ndarray]
-    """Net rotations (m, 3, 3) of polygons (m, n), by `FINE` steps."""
-    travel: Callable[[Array, Any], Array]
-    """Joint travel, rounded off; takes (x, (target, r)), as does `miss`."""
-    miss: Callable[[Array, Any], Array]
+    corners: int
+    moves: Float[np.ndarray, "j k"]
+    travel: Callable[[Array, Aim], Array]
+    """Joint travel, rounded off; or `turn` with a minus, where an aim is to go far."""
+    miss: Callable[[Array, Aim], Array]
     """Rotation vector (3,) from the target, by `COARSE` steps."""
+    turned: Callable[..., Array]
+    """Net rotations (m, 3, 3) of whole paths (m, v, j), steps per edge."""
 
-
-class PolygonTable(NamedTuple):
-    """Random polygons within one box: the first half of any kind, the others words of rectangles."""
-
-    low: Float[np.ndarray, " n"]
-    high: Float[np.ndarray, " n"]
-    x: Float[np.ndarray, "k n"]
-    turns: Float[np.ndarray, "4 k"]
-    """Quaternions of their net rotations."""
-    lengths: Float[np.ndarray, " k"]
-    """Their joint travel [rad]."""
-
-    def near(self, target: Float[np.ndarray, "3 3"], count: int) -> Float[np.ndarray, "c n"]:
-        """Those which end near a target with little travel, the most promising first, of either kind in turn."""
-        away = quaternions.angles(quaternions.product(quaternions.from_matrices(target[None]), self.turns))
-        order = np.argsort((self.lengths + _PRICE * away).reshape(2, _RANDOM), axis=1) + [[0], [_RANDOM]]
-        return self.x[order.T.ravel()[:count]]
-
-
-_polygons: OrderedDict[Hashable, Polygons] = OrderedDict()
-_pools: OrderedDict[Hashable, PolygonTable] = OrderedDict()
-
-
-def family_of(
-    robot: Robot, layout: Layout, box: AmplitudeBox, corners: int, seed: int
-) -> tuple[Polygons, PolygonTable]:
-    """Polygons with `corners` free corners and random ones within the box; the last few are kept, with programs."""
-    low, high = box.low[0], box.high[0]
-    key = key_of(robot), jax.dtypes.canonicalize_dtype(float), layout, corners
-    polygons = _kept(_polygons, key, lambda: _polygons_of(robot, layout, corners))
-    key = *key, low.tobytes(), high.tobytes(), seed
-    return polygons, _kept(_pools, key, lambda: _pool(polygons, low, high, corners, seed))
-
-
-def _kept(store: OrderedDict[Hashable, _Kept], key: Hashable, make: Callable[[], _Kept]) -> _Kept:
-    """What is stored under a key, made if it is not there; the least recently used goes when there are too many."""
-    if key not in store:
-        store[key] = make()
-        if len(store) > _KEPT:
-            store.popitem(last=False)
-    store.move_to_end(key)
-    return store[key]
-
-
-def _polygons_of(robot: Robot, layout: Layout, corners: int) -> Polygons:
-    rest = fold_angles(layout)[None]
-    before = np.concatenate([0 * rest, rest]) if layout.fold else rest
-    after = before[::-1]
-    place = np.zeros((3, layout.joints))
-    place[[0, 1, 2], [layout.twist[0], layout.bend, layout.twist[1]]] = 1.0
-
-    def paths(x: np.ndarray) -> np.ndarray:
-        inner = x.reshape(len(x), corners, 3) @ place + rest[None]
-        first, last = (np.broadcast_to(end, (len(x), *end.shape)) for end in (before, after))
+    def paths(self, x: np.ndarray, freedom: Freedom) -> np.ndarray:
+        """Whole joint paths (m, v, j) of polygons (m, n)."""
+        count = self.moves.shape[1]
+        inner = freedom.base + x[:, :-1].reshape(len(x), self.corners, count) @ self.moves.T
+        first, last = (np.broadcast_to(end, (len(x), 1, len(end))) for end in (freedom.start, freedom.end))
         return np.concatenate([first, inner, last], axis=1)
 
-    def path(x: Array) -> Path:
-        inner = x.reshape(corners, 3) @ jnp.asarray(place, x.dtype) + jnp.asarray(rest, x.dtype)
-        return Path(jnp.concatenate([jnp.asarray(before, x.dtype), inner, jnp.asarray(after, x.dtype)]))
-
-    def travel(x: Array, data: Any) -> Array:
-        moves = jnp.diff(x.reshape(corners, 3), axis=0, prepend=0.0, append=0.0)
-        return (jnp.sqrt(moves * moves + data[1] ** 2) - data[1]).sum()
-
-    def miss(x: Array, data: Any) -> Array:
-        return so3.log(data[0].T @ net_rotation(robot, path(x), steps=COARSE))
-
-    turned = jax.jit(jax.vmap(lambda x: net_rotation(robot, path(x), steps=FINE)))
-
-    def rotations(x: np.ndarray) -> np.ndarray:
-        calls = [np.arange(i, i + _CALL) for i in range(0, len(x), _CALL)]
-        found = [np.asarray(turned(x[np.minimum(call, len(x) - 1)]), float) for call in calls]
-        return np.concatenate(found)[: len(x)] if found else np.zeros((0, 3, 3))
-
-    return Polygons(paths, rotations, travel, miss)
+    def rotations(self, paths: np.ndarray, steps: int = FINE) -> np.ndarray:
+        """Net rotations (m, 3, 3) of whole paths (m, v, j)."""
+        calls = [np.arange(i, i + _CALL) for i in range(0, len(paths), _CALL)]
+        found = [np.asarray(self.turned(paths[np.minimum(call, len(paths) - 1)], steps), float) for call in calls]
+        return np.concatenate(found)[: len(paths)] if found else np.zeros((0, 3, 3))
 
 
-def _pool(polygons: Polygons, low: np.ndarray, high: np.ndarray, corners: int, seed: int) -> PolygonTable:
-    rng = np.random.default_rng(seed)
-    kinds = np.concatenate([_anyhow(rng, low, high, corners), _words(rng, low, high, corners)])
-    size = np.where(rng.random(len(kinds)) < 0.5, 1.0, 10.0 ** rng.uniform(-3, 0, len(kinds)))
-    x = (kinds * size[:, None, None]).reshape(len(kinds), -1)
-    lengths = np.abs(np.diff(polygons.paths(x), axis=1)).sum((1, 2))
-    turns = quaternions.from_matrices(polygons.rotations(x))
-    return PolygonTable(np.tile(low, corners), np.tile(high, corners), x, turns, lengths)
+_polygons: Store[Polygons] = Store(_KEPT)
 
 
-def _anyhow(rng: np.random.Generator, low: np.ndarray, high: np.ndarray, corners: int) -> np.ndarray:
-    """Random polygons (k, corners, 3) on each edge of which every joint rests or moves."""
-    moves = rng.random((corners, _RANDOM, 3)) < 0.5
-    angles = rng.uniform(low, high, moves.shape)
-    points = [np.zeros((_RANDOM, 3))]
-    for moving, angle in zip(moves, angles, strict=True):
-        points.append(np.where(moving, angle, points[-1]))
-    return np.stack(points[1:], axis=1)
+def polygons_of(robot: Robot, freedom: Freedom, corners: int) -> Polygons:
+    """Polygons with `corners` free corners; postures and limits are data, so that one program serves them all."""
+    key = key_of(robot), freedom.joints, corners
+    return _polygons.get(key, lambda: _polygons_of(robot, freedom.joints, freedom.moves, corners))
 
 
-def _words(rng: np.random.Generator, low: np.ndarray, high: np.ndarray, corners: int) -> np.ndarray:
-    """Rectangles (k, corners, 3) of random amplitudes one after another, as many as there are corners for."""
-    loops = (corners + 1) // 4
-    if not loops:
-        return _anyhow(rng, low, high, corners)
-    bend, twist = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 1.0])
-    shape = np.stack([bend, bend + twist, twist, np.zeros(3)])
-    points = (shape * rng.uniform(low, high, (_RANDOM, loops, 1, 3))).reshape(_RANDOM, -1, 3)
-    return np.pad(points, ((0, 0), (0, 1), (0, 0)))[:, np.minimum(np.arange(corners), 4 * loops)]
+def _polygons_of(robot: Robot, joints: tuple[int, ...], moves: np.ndarray, corners: int) -> Polygons:
+    count = len(joints)
+    weight = np.abs(moves).sum(0)
+    place = np.array(joints, int)
+
+    def inner(x: Array) -> Array:
+        return x[:-1].reshape(corners, count)
+
+    def travel(x: Array, aim: Aim) -> Array:
+        first, last = aim.ends[0][place], aim.ends[1][place]
+        edges = jnp.diff(jnp.concatenate([first[None], inner(x), last[None]]), axis=0)
+        rounded = jnp.sqrt(edges * edges + aim.rounding**2) - aim.rounding
+        return (1 - aim.far) * (rounded * weight[None]).sum() - aim.far * x[-1]
+
+    def miss(x: Array, aim: Aim) -> Array:
+        base = aim.ends[0] - moves @ aim.ends[0][place]
+        points = jnp.concatenate([aim.ends[:1], base[None] + inner(x) @ moves.T, aim.ends[1:]])
+        target = aim.target @ so3.exp(x[-1] * aim.axis)
+        return so3.log(target.T @ net_rotation(robot, Path(points), steps=COARSE))
+
+    def turned(paths: Array, steps: int) -> Array:
+        return jax.vmap(lambda path: net_rotation(robot, Path(path), steps=steps))(paths)
+
+    return Polygons(corners, moves, travel, miss, jax.jit(turned, static_argnums=1))

@@ -84,8 +84,8 @@ def test_coupled_joints_count_as_one():
     [
         ({"theta": np.zeros(2)}, r"`theta` has shape \(2,\)"),
         ({"theta": [0, np.nan, 0]}, "must be finite"),
-        ({"joints": [3]}, "`joints` has 3"),
-        ({"joints": ["elbow"]}, "`joints` names 'elbow'"),
+        ({"joints": [3]}, r"`joints\[0\]` is 3"),
+        ({"joints": ["elbow"]}, r"`joints\[0\]` is 'elbow'; .* twist1, bend, twist2"),
         ({"joints": [0, 0]}, "twice"),
         ({"robot": 3}, "`robot` is a int"),
     ],
