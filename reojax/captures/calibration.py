@@ -30,6 +30,7 @@ from reojax._internal.arrays import Array
 from reojax.captures.capture import Capture
 from reojax.captures.comparison import BLOCK, align_frames, fill_gaps, interpolate
 from reojax.captures.parameters import Parameter, Put, resolve
+from reojax.mechanics.integrators import GAUSS_4, magnus4
 from reojax.mechanics.momentum import connection
 from reojax.robot import Robot
 
@@ -329,14 +330,13 @@ def _edges(puts: tuple[Put, ...], x: Array, robot: Robot, theta: Array) -> tuple
     joints = theta.shape[1]
 
     def exponent(numbers: Array) -> Array:
-        """Magnus expansion to fourth order, two Gauss nodes."""
+        """Rotation vector of the edge."""
         changed: Any = robot
         for k, put in enumerate(puts):
             changed = put(changed, numbers[k])
         start, end = jnp.split(numbers[len(puts) :], [joints])
-        nodes = jnp.stack([start + (0.5 + s / np.sqrt(12)) * (end - start) for s in (-1, 1)])
-        first, second = jax.vmap(lambda node: connection(changed, node) @ (end - start))(nodes)
-        return 0.5 * (first + second) + np.sqrt(3) / 12 * jnp.cross(first, second)
+        nodes = jnp.stack([start + share * (end - start) for share in GAUSS_4])
+        return magnus4(*jax.vmap(lambda node: connection(changed, node) @ (end - start))(nodes))
 
     def edge(start: Array, end: Array) -> tuple[Array, Array]:
         numbers = jnp.concatenate([jnp.asarray(x), start, end])

@@ -15,7 +15,7 @@ vector of each step.
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,11 +23,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
-from reojax import so3
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
 from reojax._internal.linalg import solve_positive
 from reojax.mechanics.dynamics import joint_inertia, joint_load
+from reojax.mechanics.integrators import RK4, runge_kutta_step
 from reojax.motion.motor import Motor, check_motors, drive, per_joint
 from reojax.motion.trajectory import Trajectory
 from reojax.robot import Robot
@@ -221,11 +221,15 @@ def _track(
         saturated = torque != command
         kept = jnp.where(saturated, integral, summed)  # no wind-up
 
-        def clip_between(state: tuple[Array, ...], _: None) -> tuple[tuple[Array, ...], None]:
-            return _runge_kutta(robot, motors, momentum, command, period / substeps, *state), None
+        def rates(rotation: Array, joints: tuple[Array, Array], _: None) -> tuple[Array, tuple[Array, Array]]:
+            acceleration, omega = _acceleration(robot, motors, command, *joints, rotation.T @ momentum)
+            return omega, (joints[1], acceleration)
 
-        state, _ = jax.lax.scan(clip_between, (theta, theta_dot, rotation), length=substeps)
-        return (*state, kept, seen), (theta, theta_dot, rotation, command, torque, saturated)
+        def between(state: tuple[Array, Any], _: None) -> tuple[tuple[Array, Any], None]:
+            return runge_kutta_step(RK4, rates, period / substeps, *state), None
+
+        (turned, joints), _ = jax.lax.scan(between, (rotation, (theta, theta_dot)), length=substeps)
+        return (*joints, turned, kept, seen), (theta, theta_dot, rotation, command, torque, saturated)
 
     start = plan.theta[0], plan.theta_dot[0], jnp.eye(3, dtype=dtype)
     before = start[0] - period * start[1]  # what was seen one sample earlier
@@ -247,34 +251,6 @@ def _saturate(motors: Motor, command: Array, speed: Array) -> Array:
     k = motors.torque_constant
     least, most = (jnp.asarray((sign * motors.supply - k * speed) * k / motors.resistance) for sign in (-1, 1))
     return jnp.clip(command, least, most)
-
-
-_Slope = tuple[Array, Array, Array]
-
-
-def _runge_kutta(
-    robot: Robot, motors: Motor, momentum: Array, command: Array, h: Array, theta: Array, rate: Array, start: Array
-) -> tuple[Array, Array, Array]:
-    """Joint angles, rates and orientation after a step of fourth order."""
-
-    still = jnp.zeros_like(theta), jnp.zeros_like(rate), jnp.zeros_like(momentum)
-
-    def stage(carry: tuple[_Slope, _Slope], inputs: tuple[Array, Array]) -> tuple[tuple[_Slope, _Slope], None]:
-        last, total = carry
-        part, weight = inputs
-        moved_rate, turn = rate + part * last[1], part * last[2]
-        rotation = jnp.matmul(start, so3.exp(turn), precision="highest")
-        acceleration, omega = _acceleration(
-            robot, motors, command, theta + part * last[0], moved_rate, rotation.T @ momentum
-        )
-        twist = jnp.cross(turn, omega)
-        slope = moved_rate, acceleration, omega + twist / 2 + jnp.cross(turn, twist) / 12
-        return (slope, jax.tree.map(lambda s, k: s + weight * k, total, slope)), None
-
-    table = h * jnp.array([0, 0.5, 0.5, 1], theta.dtype), h / 6 * jnp.array([1, 2, 2, 1], theta.dtype)
-    (_, total), _ = jax.lax.scan(stage, (still, still), table)  # a loop: one stage to compile
-    turned = jnp.matmul(start, so3.exp(total[2]), precision="highest")
-    return theta + total[0], rate + total[1], turned
 
 
 def _acceleration(

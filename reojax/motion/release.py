@@ -24,6 +24,7 @@ from reojax import so3
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
 from reojax._internal.linalg import solve_symmetric3
+from reojax.mechanics.integrators import RK4, runge_kutta_step
 from reojax.mechanics.kinematics import kinematics
 from reojax.mechanics.momentum import momentum_matrices
 from reojax.motion.trajectory import Trajectory, polynomial
@@ -225,27 +226,14 @@ def _nodes(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Arr
 def _integrate(length: Array, nodes: _Node, release: Array) -> tuple[Array, Array]:
     """Rotations (m, 3, 3) and momenta (m, 3): Runge-Kutta of order four on the rotation vector of each step."""
     momentum, pull, tied, drag = release[:3], release[3:6], release[6:9], release[9]
-    still = jnp.zeros_like(momentum)
-    parts, weights = jnp.array([0, 0.5, 0.5, 1], momentum.dtype), jnp.array([1, 2, 2, 1], momentum.dtype) / 6
-    nodes = jax.tree.map(lambda leaf: leaf[:, np.array([0, 1, 1, 2])], nodes)
+
+    def rates(rotation: Array, momentum: Array, node: _Node) -> tuple[Array, Array]:
+        omega = node.own + node.mobility @ (rotation.T @ momentum)
+        return omega, jnp.cross(rotation @ (tied - node.middle), pull) - drag * (rotation @ omega)
 
     def step(state: tuple[Array, Array], inputs: tuple[Array, _Node]) -> tuple[tuple[Array, Array], tuple]:
-        start, momentum = state
         h, node = inputs
-
-        def stage(carry: tuple, inputs: tuple[Array, Array, _Node]) -> tuple[tuple, None]:
-            turn_rate, moment, turn_sum, moment_sum = carry
-            part, weight, node = inputs
-            turn = h * part * turn_rate
-            rotation = jnp.matmul(start, so3.exp(turn), precision="highest")
-            omega = node.own + node.mobility @ (rotation.T @ (momentum + h * part * moment))
-            moment = jnp.cross(rotation @ (tied - node.middle), pull) - drag * (rotation @ omega)
-            twist = jnp.cross(turn, omega)
-            turn_rate = omega + twist / 2 + jnp.cross(turn, twist) / 12
-            return (turn_rate, moment, turn_sum + weight * turn_rate, moment_sum + weight * moment), None
-
-        (*_, turn, moment), _ = jax.lax.scan(stage, (still,) * 4, (parts, weights, node))  # one stage to compile
-        end = jnp.matmul(start, so3.exp(h * turn), precision="highest"), momentum + h * moment
+        end = runge_kutta_step(RK4, rates, h, *state, node)
         return end, end
 
     first = jnp.eye(3, dtype=momentum.dtype)
