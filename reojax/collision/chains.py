@@ -52,10 +52,14 @@ def structure_of(robot: Robot) -> Structure:
     return Structure(robot.parent, robot.capsule_link, robot.collision_pairs)
 
 
-def geometry_of(robot: Robot, dtype: np.dtype) -> Geometry:
-    """Return the numbers of a robot's shapes, joint axes at unit length."""
-    fields = (robot.axis, robot.anchor, robot.capsule_start, robot.capsule_end, robot.capsule_radius)
-    axis, *others = (jnp.asarray(field, dtype) for field in fields)
+def geometry_of(robot: Robot) -> Geometry:
+    """Return the numbers of a robot's shapes, as they are: `unit_axes` makes them fit to compute with."""
+    return Geometry(robot.axis, robot.anchor, robot.capsule_start, robot.capsule_end, robot.capsule_radius)
+
+
+def unit_axes(geometry: Geometry, dtype: np.dtype) -> Geometry:
+    """Return the geometry as arrays of one dtype with joint axes of unit length."""
+    axis, *others = (jnp.asarray(field, dtype) for field in geometry)
     return Geometry(axis / jnp.sqrt((axis * axis).sum(1, keepdims=True)), *others)
 
 

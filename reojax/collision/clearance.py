@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._internal.arrays import Array
-from reojax.collision.chains import Geometry, Structure, geometry_of, structure_of
+from reojax._internal import checks
+from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
+from reojax.collision.chains import Geometry, Structure, geometry_of, structure_of, unit_axes
 from reojax.collision.placement import pair_ends
 from reojax.collision.segments import segment_distance
-from reojax.mechanics.input_checks import check_motion
 from reojax.robot import Robot
 
 
@@ -32,20 +32,27 @@ def clearance(robot: Robot, theta: ArrayLike) -> Float[Array, " p"]:
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
-    robot, angles = check_motion(robot, theta=theta)
-    return _clearance(geometry_of(robot, angles.dtype), angles[:, None], structure_of(robot))[:, 0]
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
+    angles = as_numbers("theta", theta)
+    if angles.shape != (robot.joints,):
+        raise ValueError(
+            f"`theta` has shape {angles.shape}; {robot.name!r} has {robot.joints} joints: it must be ({robot.joints},)."
+        )
+    if is_concrete(angles) and not np.isfinite(angles).all():
+        raise ValueError(f"`theta` is {np.asarray(angles).tolist()}; it must be finite.")
+    return clearances(robot, angles[None])[:, 0]
 
 
 def clearances(robot: Robot, thetas: Float[Array, "s j"]) -> Float[Array, "p s"]:
     """Clearances of all pairs at many postures, unchecked and in one pass [m]."""
-    points = jnp.asarray(thetas)
-    return _clearance(geometry_of(robot, points.dtype), points.T, structure_of(robot))
+    return _clearances(geometry_of(robot), thetas, structure_of(robot), common_float(geometry_of(robot), thetas))
 
 
-@partial(jax.jit, static_argnums=2)
-def _clearance(geometry: Geometry, theta: jax.Array, structure: Structure) -> jax.Array:
+@partial(jax.jit, static_argnums=(2, 3))
+def _clearances(geometry: Geometry, thetas: Array, structure: Structure, dtype: np.dtype) -> jax.Array:
+    theta, geometry = jnp.asarray(thetas, dtype).T, unit_axes(geometry, dtype)
     if not structure.pairs:
-        return jnp.zeros((0, theta.shape[1]), theta.dtype)
+        return jnp.zeros((0, theta.shape[1]), dtype)
     return segment_distance(*pair_ends(structure, geometry, theta)) - radii(structure, geometry)[:, None]
 
 
