@@ -39,10 +39,11 @@ INK = ("#0072b2", "#d55e00")
 
 
 def main(out: Path, *, quick: bool = False, target: float = 180.0) -> dict:
-    """Print loops and trade-offs, write `design_opt.json` and `design_opt.png`."""
+    """Print loops and trade-offs, write `design_opt` as .json, .png and .html (a page to look at)."""
     if not 0 < target < 360:
         raise ValueError(f"`--target` is {target:g}; it must be a roll between 0 and 360 degrees.")
     picture, record = plot.check_picture(out / "design_opt.png"), check_writable(out / "design_opt.json")
+    page = check_writable(out / "design_opt.html")
     loops = best_loops(np.deg2rad(target), quick=quick)
     curves = trade_off(np.deg2rad(target), points=5 if quick else 13)
 
@@ -67,8 +68,23 @@ def main(out: Path, *, quick: bool = False, target: float = 180.0) -> dict:
     }
     plot.save(_picture(loops, curves, target), picture)
     write_json(record, answer)
-    print(f"wrote {picture} and {record}")
+    _show(loops, target, page)
+    print(f"wrote {picture}, {record} and {page}")
     return answer
+
+
+def _show(loops: list[dict[str, Any]], target: float, page: Path) -> None:
+    """The polygon beside manoeuvre A on the prototype as it is, as a page for a browser."""
+    polygon = next(loop for loop in loops if "polygon" in loop["loop"])
+    reojax.view(
+        prototype(),
+        reojax.polygon(np.deg2rad(polygon["waypoints_deg"])),
+        page,
+        beside=reojax.manoeuvre_a(np.deg2rad(270.0), np.deg2rad(120.0)),
+        target=reojax.so3.exp(np.array([0.0, 0.0, np.deg2rad(target)])),
+        names=[f"{polygon['loop']}, {polygon['travel_deg']:.0f}° of travel", "manoeuvre A, 270°/120°"],
+        title=f"The prototype turns by {target:g}° of roll: least joint travel",
+    )
 
 
 def best_loops(roll: float, *, quick: bool) -> list[dict[str, Any]]:

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, version
+from reojax.cli._page import add_page, check_page, write_page
 from reojax.cli._planned import add_plan, plan_motion
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--calibrate", metavar="NAMES", help=fitted)
     add("--json", action="store_true", help="print one JSON object, with all digits")
     add("--out", metavar="FIGURE", help="draw measured and simulated angles to a .png, .pdf or .svg")
+    add_page(parser, "the simulated motion with the measured one as its ghost")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -38,11 +40,13 @@ def run(args: argparse.Namespace) -> None:
     try:
         if args.out is not None:
             _check_picture(args.out)
+        check_page(args)
         robot = robots.by_name(args.robot)
         capture = read_capture(args.capture, robot, angle_unit=args.angles)
         report, robot, comparison = _report(robot, capture, args)
         if args.out is not None:
             _draw(robot, comparison, args)
+        write_page(args, robot, comparison, title=f"{args.capture} on {args.robot}")
     except ValueError as error:
         raise BadInput(f"reojax compare: {error}") from error
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(report))
@@ -99,6 +103,7 @@ def _report(
         "last_tilt_roll_simulated_rad": _numbers(comparison.simulated_tilt_roll[last]),
         "calibration": None if fit is None else _calibration(fit),
         "picture": args.out,
+        "page": args.html,
     }
     return report, robot, comparison
 
@@ -181,6 +186,8 @@ def _text(report: dict[str, Any]) -> str:
         lines += ["", *_fit_text(r["calibration"])]
     if r["picture"] is not None:
         lines += ["", f"picture in {r['picture']}"]
+    if r["page"] is not None:
+        lines += ["", f"page in {r['page']}"]
     return "\n".join(lines)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, degrees, version
+from reojax.cli._page import add_page, check_page, write_page
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,7 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--corners", type=int, default=8, metavar="N", help="free corners of a free path [%(default)d]")
     add("--json", action="store_true", help="print one JSON object, with all digits")
     add("--out", metavar="FIGURE", help="draw the orientation on its way to a .png, .pdf or .svg")
-    add("--animate", metavar="GIF", help="draw the robot on its way to a .gif")
+    add("--animate", metavar="FILM", help="draw the robot on its way to an .mp4 (needs ffmpeg) or a .gif")
+    add_page(parser, "the robot on its way")
     add("--csv", metavar="FILE", help="write the corners of the joint path, in degrees, to a .csv")
 
 
@@ -49,6 +51,7 @@ def run(args: argparse.Namespace) -> None:
         robot = robots.by_name(args.robot)
         target = read_target(args.target)
         _check_files(args)
+        check_page(args)
         plan = _plan(robot, target, args)
         _write_files(robot, plan, target, args)
     except ValueError as error:
@@ -162,6 +165,7 @@ def _write_files(robot: "Robot", plan: "Plan | FreePaths", target: "np.ndarray",
         from reojax import plot
 
         plot.save(plot.plan_figure(robot, plan, target), args.out)
+    write_page(args, robot, plan, title=f"Plan for {args.target} on {args.robot}", target=target)
     if args.animate is not None:
         from reojax import plot
         from reojax.path import polygon
@@ -205,6 +209,7 @@ def _report(robot: "Robot", plan: "Plan | FreePaths", target: "np.ndarray", args
         "converged": bool(plan.converged),
         "picture": args.out if drawn else None,
         "animation": args.animate if drawn else None,
+        "page": args.html if drawn else None,
         "csv": args.csv,
     }
 
@@ -225,7 +230,9 @@ def _text(report: dict[str, Any]) -> str:
     else:
         what = "path" if free else "plan"
         lines.append(f"NOT reached: {report['error_deg']:.4f} deg ({error}) are left; this is the closest {what}")
-    lines += [f"{what} in {report[what]}" for what in ("picture", "animation", "csv") if report[what] is not None]
+    lines += [
+        f"{what} in {report[what]}" for what in ("picture", "animation", "page", "csv") if report[what] is not None
+    ]
     return "\n".join(lines)
 
 

@@ -8,6 +8,7 @@ from reojax.cli._arguments import BadInput, version
 from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, path_of
 from reojax.cli._motion import LAW, check_law, motion_of, motion_report, motion_text
 from reojax.cli._motors import add_motors, momentum, seconds
+from reojax.cli._page import add_page, check_page, write_page
 
 if TYPE_CHECKING:
     from reojax.motion.simulation import Motion
@@ -29,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--momentum", type=momentum, metavar="X,Y,Z", help=spin)
     add("--json", action="store_true", help="print one JSON object, with all digits")
     add("--out", metavar="FIGURE", help="draw orientation and joint angles to a .png, .pdf or .svg")
+    add_page(parser, "the turn")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -42,12 +44,14 @@ def run(args: argparse.Namespace) -> None:
         check_law(args)
         if args.out is not None:
             _check_picture(args.out)
+        check_page(args)
         motion = motion_of(robot, path, args)
         report, history = _report(robot, path, args)
         if motion is not None:
             report["motion"] = motion_report(robot, motion, args)
         if args.out is not None:
             _draw(robot, path, history, motion, args)
+        write_page(args, robot, path if motion is None else motion, title=_title(args))
     except ValueError as error:
         raise BadInput(f"reojax simulate: {error}") from error
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(report, args))
@@ -59,10 +63,14 @@ def _check_picture(out: str) -> None:
     plot.check_picture(out)
 
 
+def _title(args: argparse.Namespace) -> str:
+    return heading(args).replace(" deg", "°").replace(" -", " \u2212")
+
+
 def _draw(robot: "Robot", path: "Path", history: Any, motion: "Motion | None", args: argparse.Namespace) -> None:
     from reojax import plot
 
-    title = heading(args).replace(" deg", "°").replace(" -", " \u2212")
+    title = _title(args)
     if motion is None:
         figure = plot.history_figure(robot, path, title=title, edge_names=edge_names(robot), rotations=history)
     else:
@@ -123,6 +131,7 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
         },
         "joints_beyond_limits": [robot.joint_names[k] for k in np.flatnonzero(np.any(beyond, axis=0))],
         "picture": args.out,
+        "page": args.html,
     }
     return report, history
 
@@ -159,6 +168,8 @@ def _text(report: dict[str, Any], args: argparse.Namespace) -> str:
         lines += motion_text(report["motion"])
     if report["picture"] is not None:
         lines += ["", f"picture in {report['picture']}"]
+    if report["page"] is not None:
+        lines += ["", f"page in {report['page']}"]
     return "\n".join(lines)
 
 

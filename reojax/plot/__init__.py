@@ -10,9 +10,6 @@ from reojax.plot.control import bandwidth_figure as bandwidth_figure, tracking_f
 from reojax.plot.files import FORMATS as FORMATS, check_picture as check_picture, save as save
 from reojax.plot.frames import (
     Frames as Frames,
-    animate as animate,
-    animation as animation,
-    check_animation as check_animation,
     draw_frames as draw_frames,
     frames_along as frames_along,
     frames_figure as frames_figure,
@@ -32,3 +29,4 @@ from reojax.plot.motion import motion_figure as motion_figure, torque_speed_figu
 from reojax.plot.plans import plan_figure as plan_figure
 from reojax.plot.robots import draw_axes as draw_axes, draw_robot as draw_robot, draw_robot_flat as draw_robot_flat
 from reojax.plot.sweeps import sweep_figure as sweep_figure
+from reojax.plot.video import animate as animate, animation as animation, check_animation as check_animation

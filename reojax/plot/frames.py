@@ -1,23 +1,16 @@
-"""A robot on its way: rows of frames, and animations."""
+"""A robot on its way, in rows of frames."""
 
 from __future__ import annotations
 
-import io
-import os
 from collections.abc import Sequence
-from pathlib import Path as File
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
-from PIL import Image
-from tqdm import tqdm
 
 from reojax._internal.arrays import as_numbers
-from reojax._internal.files import check_writable, replacing
 from reojax.drawing.colours import INK
 from reojax.drawing.view import View
 from reojax.mechanics.holonomy import rotation_history
@@ -69,18 +62,18 @@ def draw_frames(
     Raises:
         ValueError: if numbers of axes, frames and titles differ, or a pose does not fit the robot.
     """
-    frames = _check_frames(robot, frames)
+    frames = check_frames(robot, frames)
     count = len(frames.theta)
     if len(axes) != count or (titles is not None and len(titles) != count):
         named = "" if titles is None else f" and {len(titles)} titles"
         raise ValueError(f"there are {len(axes)} axes{named} for {count} frames; each frame needs its own.")
-    low, high = _extent(robot, frames)
+    low, high = extent(robot, frames)
     for k, place in enumerate(axes):
         draw_robot(place, robot, frames.theta[k], frames.rotation[k], view=view)
-        _stage(place, low, high)
+        stage(place, low, high)
         if titles is not None:
             place.set_title(titles[k], fontsize=9, color=INK, pad=-4)
-    _directions(axes[0], low, high)
+    directions(axes[0], low, high)
     return axes
 
 
@@ -128,113 +121,8 @@ def frames_figure(
     return figure
 
 
-def animation(
-    robot: Robot,
-    path: Path,
-    file: str | os.PathLike[str],
-    *,
-    frames: int = 60,
-    seconds: float = 4.0,
-    titles: Sequence[str] | None = None,
-    view: View | None = None,
-    progress: bool = False,
-) -> None:
-    """Write a GIF of a robot along a path at zero momentum, every edge equally long; whole or not at all.
-
-    Args:
-        robot: the robot.
-        path: the path in shape space.
-        file: where to, a name that ends in .gif.
-        frames: number of frames, about; every edge has equally many.
-        seconds: how long the path takes. The last frame stays for a second, then it starts again.
-        titles: a name for each edge.
-        view: from where to look; default from the front, y up.
-        progress: whether to show progress on stderr.
-
-    Raises:
-        ValueError: if the file cannot be written, the path does not fit the robot, or a number is not positive.
-    """
-    target = check_animation(file)
-    if not path.edges:
-        raise ValueError("`path` has one waypoint; an animation needs an edge.")
-    if titles is not None and len(titles) != path.edges:
-        raise ValueError(f"`titles` has {len(titles)} names; the path has {path.edges} edges.")
-    if isinstance(frames, bool) or not isinstance(frames, int) or frames < 1:
-        raise ValueError(f"`frames` is {frames!r}; it must be a positive integer.")
-    per_edge = -(-frames // path.edges)
-    poses = frames_along(robot, path, per_edge=per_edge)
-    names = None
-    if titles is not None:
-        names = [titles[min(k // per_edge, path.edges - 1)] for k in range(len(poses.theta))]
-    animate(robot, poses, target, seconds=seconds, titles=names, view=view, progress=progress)
-
-
-def animate(
-    robot: Robot,
-    frames: Frames,
-    file: str | os.PathLike[str],
-    *,
-    seconds: float = 4.0,
-    titles: Sequence[str] | None = None,
-    view: View | None = None,
-    progress: bool = False,
-) -> None:
-    """Write a GIF of a robot in given poses, equally spaced in time; whole or not at all.
-
-    Args:
-        robot: the robot.
-        frames: its poses, such as `frames_along` or a simulation gives.
-        file: where to, a name that ends in .gif.
-        seconds: from first to last pose. The last one stays for a second, then it starts again.
-        titles: a line above each frame.
-        view: from where to look; default from the front, y up.
-        progress: whether to show progress on stderr.
-
-    Raises:
-        ValueError: if the file cannot be written, a pose does not fit the robot, or a number is not positive.
-    """
-    target = check_animation(file)
-    frames = _check_frames(robot, frames)
-    count = len(frames.theta)
-    if not 0 < seconds < np.inf:
-        raise ValueError(f"`seconds` is {seconds!r}; it must be positive and finite.")
-    if titles is not None and len(titles) != count:
-        raise ValueError(f"`titles` has {len(titles)} lines; there are {count} frames.")
-    low, high = _extent(robot, frames)
-    images = []
-    for k in tqdm(range(count), desc=target.name, unit=" frames", disable=not progress):
-        figure = Figure(figsize=(3.6, 3.2), dpi=100, facecolor="white")
-        canvas = FigureCanvasAgg(figure)
-        axes = cast(Axes3D, figure.add_axes((0.0, 0.0, 1.0, 0.93), projection="3d"))
-        draw_robot(axes, robot, frames.theta[k], frames.rotation[k], view=view)
-        _stage(axes, low, high)
-        _directions(axes, low, high)
-        if titles is not None:
-            figure.text(0.03, 0.93, titles[k], fontsize=11, color=INK)
-        canvas.draw()
-        image = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3].copy())
-        images.append(image.quantize(64, dither=Image.Dither.NONE))
-    pause = max(round(1000 * seconds / max(count - 1, 1)), 20)
-    whole = io.BytesIO()
-    images[0].save(
-        whole, "GIF", save_all=True, append_images=images[1:], loop=0, duration=[pause] * (count - 1) + [1000]
-    )
-    with replacing(target) as out:
-        out.write(whole.getvalue())
-
-
-def check_animation(file: str | os.PathLike[str]) -> File:
-    """Return `file` if an animation can be written there now; for asking before a long computation.
-
-    Raises:
-        ValueError: for an ending other than .gif, or a path that cannot be written.
-    """
-    if File(file).suffix.lower() != ".gif":
-        raise ValueError(f"cannot write {str(file)!r}: the name of an animation ends in .gif.")
-    return check_writable(file)
-
-
-def _check_frames(robot: Robot, frames: Frames) -> Frames:
+def check_frames(robot: Robot, frames: Frames) -> Frames:
+    """Poses as arrays of float64, or a ValueError if they do not fit the robot."""
     theta, rotation = (np.asarray(as_numbers(name, x), float) for name, x in zip(Frames._fields, frames, strict=True))
     if theta.ndim != 2 or theta.shape[1] != robot.joints or not len(theta) or not np.isfinite(theta).all():
         raise ValueError(f"`theta` has shape {theta.shape}; for {robot.name!r} it must be (m, {robot.joints}), finite.")
@@ -245,22 +133,22 @@ def _check_frames(robot: Robot, frames: Frames) -> Frames:
     return Frames(theta, rotation)
 
 
-def _extent(robot: Robot, frames: Frames) -> tuple[np.ndarray, np.ndarray]:
+def extent(robot: Robot, frames: Frames) -> tuple[np.ndarray, np.ndarray]:
     """Corners of the box about all frames."""
     points = [faces_at_pose(robot, *pose)[0].reshape(-1, 3) for pose in zip(*frames, strict=True)]
     return np.min([p.min(0) for p in points], axis=0), np.max([p.max(0) for p in points], axis=0)
 
 
-def _stage(axes: Axes3D, low: np.ndarray, high: np.ndarray) -> None:
+def stage(axes: Axes3D, low: np.ndarray, high: np.ndarray, zoom: float = 1.45) -> None:
     """Show the same space in every frame, without panes or ticks."""
     middle, half = (low + high) / 2, max(high - low) / 2
     for limit, centre in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), middle, strict=True):
         limit(centre - half, centre + half)
-    axes.set_box_aspect((1, 1, 1), zoom=1.45)  # pyright: ignore[reportArgumentType]  (zoom is a float)
+    axes.set_box_aspect((1, 1, 1), zoom=zoom)  # pyright: ignore[reportArgumentType]  (zoom is a float)
     axes.set_axis_off()
 
 
-def _directions(axes: Axes3D, low: np.ndarray, high: np.ndarray) -> None:
+def directions(axes: Axes3D, low: np.ndarray, high: np.ndarray) -> None:
     """Draw the inertial directions in the lower left corner of the page; their length is the scale."""
     camera = View(axes.elev, axes.azim, "xyz"[axes._vertical_axis]).camera()  # pyright: ignore
     half = max(high - low) / 2

@@ -1,6 +1,7 @@
 """`reojax view`: pages of manoeuvres and plans; what cannot be shown is said in one line."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -63,3 +64,15 @@ def test_refusals_are_one_line(words, tmp_path, monkeypatch, capsys):
 def test_bad_plans(changes, words, tmp_path, capsys):
     assert main(["view", str(plan_file(tmp_path, **changes)), "--out", str(tmp_path / "turn.html")]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_page_beside_the_numbers(tmp_path, capsys):
+    """`--html` writes what `simulate`, `plan` and `compare` computed."""
+    names = [str(tmp_path / f"{k}.html") for k in "spc"]
+    capture = str(Path(__file__).parents[2] / "docs" / "synthetic_capture.csv")
+    assert main(["simulate", "--twist", "60", "--duration", "1", "--html", names[0]]) == 0
+    assert main(["plan", "--target", "rotvec 0 0 20", "--html", names[1]]) == 0
+    assert main(["compare", capture, "--html", names[2]]) == 0
+    assert '"timed":true' in Path(names[0]).read_text()
+    assert '"target":[[' in Path(names[1]).read_text()
+    assert '"role":"measured"' in Path(names[2]).read_text()

@@ -1,6 +1,8 @@
 """Pictures of robots: every part where mechanics says it is, files whole or not at all, bad input named."""
 
 import os
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -150,7 +152,8 @@ def test_an_animation_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     frames = plot.Frames(np.zeros((3, 3)), np.stack([np.eye(3), TURN, TURN @ TURN]))
     plot.animate(PROTOTYPE, frames, out, seconds=1.0, titles=list("abc"))
     with Image.open(out) as image:
-        assert image.n_frames == 3
+        assert image.size == (960, 720)
+        assert image.n_frames >= 3
         assert image.info["loop"] == 0
     before = out.read_bytes()
 
@@ -162,6 +165,27 @@ def test_an_animation_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
         plot.animate(PROTOTYPE, frames, out)
     assert out.read_bytes() == before
     assert os.listdir(tmp_path) == ["a.gif"]
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg, so no .mp4")
+def test_a_film_tells_its_time(tmp_path, monkeypatch):
+    """An MP4 of 960 x 720 with the times that the poses have; without ffmpeg it is refused with what to do."""
+    frames = plot.Frames(np.zeros((3, 3)), np.stack([np.eye(3), TURN, TURN @ TURN]))
+    out, told = tmp_path / "a.mp4", set()
+    real = Figure.savefig
+
+    def look(figure, *arguments, **options):
+        told.update(text.get_text() for text in figure.texts)
+        return real(figure, *arguments, **options)
+
+    monkeypatch.setattr(Figure, "savefig", look)
+    plot.animate(PROTOTYPE, frames, out, seconds=1.0, time=[0.0, 0.2, 0.4], title="A turn")
+    assert {"A turn", "0.000 s", "0.200 s", "0.400 s"} <= told
+    shape = "ffprobe -v error -select_streams v -show_entries stream=width,height -of csv=p=0".split()
+    assert subprocess.run([*shape, out], capture_output=True, text=True, check=True).stdout.strip() == "960,720"
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    with pytest.raises(ValueError, match="needs the program ffmpeg, which is missing; .gif does not"):
+        plot.check_animation(out)
 
 
 BAD = {
@@ -176,7 +200,7 @@ BAD = {
     "each frame needs its own": lambda tmp: plot.draw_frames([space()], PROTOTYPE, plot.Frames(*TWO)),
     "(m, 3)": lambda tmp: plot.draw_frames([space()], PROTOTYPE, plot.Frames(np.zeros((1, 2)), TURN[None])),
     "3 titles": lambda tmp: plot.draw_frames([space()] * 2, PROTOTYPE, plot.Frames(*TWO), titles=list("abc")),
-    "ends in .gif": lambda tmp: plot.animation(PROTOTYPE, LOOP, tmp / "a.png"),
+    "ends in one of .mp4, .gif": lambda tmp: plot.animation(PROTOTYPE, LOOP, tmp / "a.png"),
     "no folder": lambda tmp: plot.animation(PROTOTYPE, LOOP, tmp / "none" / "a.gif"),
     "needs an edge": lambda tmp: plot.animation(PROTOTYPE, reojax.polygon(np.zeros((1, 3))), tmp / "a.gif"),
     "`frames`": lambda tmp: plot.animation(PROTOTYPE, LOOP, tmp / "a.gif", frames=0),
