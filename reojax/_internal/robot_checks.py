@@ -91,7 +91,7 @@ def _couplings(value: Any, names: tuple[str, ...]) -> dict[str, Any]:
 def _ask_for_degrees(lower: np.ndarray, upper: np.ndarray, names: Sequence[str]) -> None:
     """Warn of limits of more than four turns: they are legal, and mostly degrees."""
     for entry, limits in (("lower", lower), ("upper", upper)):
-        for k in np.flatnonzero(np.isfinite(limits) & (np.abs(limits) > _MANY_TURNS)):
+        for k in map(int, np.flatnonzero(np.isfinite(limits) & (np.abs(limits) > _MANY_TURNS))):
             warnings.warn(
                 f"{entry}[{k}] ({names[k]}) is {limits[k]:g} rad, {abs(limits[k]) / (2 * np.pi):.1f} turns: "
                 "are these degrees? Limits are in rad.",
@@ -113,7 +113,7 @@ def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str,
     if not mass.any():
         raise ValueError("`mass` is 0 kg for every link; a robot has some mass.")
     length = np.linalg.norm(axis, axis=1)
-    for k in np.flatnonzero(np.abs(length - 1) > _TOLERANCE):
+    for k in map(int, np.flatnonzero(np.abs(length - 1) > _TOLERANCE)):
         raise ValueError(
             f"axis[{k}] ({joint_names[k]}) is {axis[k].tolist()}, of length {length[k]:.9g}; it must have unit length."
         )

@@ -24,6 +24,8 @@ class Shape(NamedTuple):
     """Of a mesh, as the robot file names it."""
     vertices: np.ndarray | None = None
     """Of a mesh that has been read, (v, 3) in the shape's frame [m]."""
+    faces: np.ndarray | None = None
+    """Likewise, (f, 3) numbers of vertices."""
 
 
 class LinkEntry(NamedTuple):

@@ -210,11 +210,13 @@ def _layout(where: str, value: Any) -> Layout | None:
     for key in ("joints", "bend"):
         if isinstance(row[key], bool) or not isinstance(row[key], int):
             raise ValueError(f"{where}.layout.{key} is {shorten(row[key])}; it must be an integer.")
+    first, last = joints("twist", 2)
+    fold = None if row["fold"] is None else joints("fold", 2)
     layout = Layout(
         joints=row["joints"],
-        twist=joints("twist", 2),
+        twist=(first, last),
         bend=row["bend"],
-        fold=None if row["fold"] is None else joints("fold", 2),
+        fold=None if fold is None else (fold[0], fold[1]),
         fold_angle=tuple(_numbers(f"{where}.layout.fold_angle", row["fold_angle"], (2,))),
     )
     check_layout(layout)

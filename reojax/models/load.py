@@ -74,7 +74,7 @@ def load_robot(
         robot = read_robot(path)
         return robot if name is None else robot.replace(name=name)
     try:
-        description = _describe(path, data)
+        description = _describe(path, data, base)
         robot = _build(description, path, base, given, repair, name, shapes)
     except ValueError as error:
         text = str(error)
@@ -82,14 +82,14 @@ def load_robot(
     return robot
 
 
-def _describe(path: str | os.PathLike[str], data: bytes) -> Description:
+def _describe(path: str | os.PathLike[str], data: bytes, base: str | None) -> Description:
     root = parse_xml(data.lstrip())
     if root.tag == "robot":
         return read_urdf(root)
     if root.tag == "mujoco":
         from reojax.models.mjcf import read_mjcf
 
-        return read_mjcf(path, root)
+        return read_mjcf(path, root, base)
     kinds = {"sdf": "an SDF file", "mujocoinclude": "a part that an MJCF file includes", "COLLADA": "a mesh"}
     what = kinds.get(root.tag, f"XML with the root <{root.tag:.40}>")
     raise ValueError(f"it is {what}; a robot file is a URDF (<robot>) or an MJCF (<mujoco>)")
