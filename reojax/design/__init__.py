@@ -9,6 +9,7 @@ from reojax.design.link_edits import (
 from reojax.design.loops import Loops as Loops, polygons as polygons, rectangles as rectangles
 from reojax.design.measures import (
     bend_within as bend_within,
+    clear_by as clear_by,
     loop_area as loop_area,
     off_axis_within as off_axis_within,
     travel as travel,

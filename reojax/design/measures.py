@@ -7,11 +7,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax import so3
+from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax._internal.checks import numbers
+from reojax.collision.constraint import clearance_shortfall
 from reojax.design.loops import Loops
 from reojax.design.problem import Measure, Outcome
 from reojax.path import joint_travel
+
+_BETWEEN = 2.0
+"""Clearance kept in hand for what lies between samples: for leaving the chord, and for normals that turn."""
 
 
 def turned_to(target: ArrayLike | str) -> Measure:
@@ -102,6 +107,28 @@ def loop_area(outcome: Outcome) -> Array:
     moment = middle.T @ step
     tiny = jnp.finfo(points.dtype).tiny
     return jnp.sqrt(0.125 * ((moment - moment.T) ** 2).sum() + tiny)
+
+
+def clear_by(margin: float, *, samples: int | None = None) -> Measure:
+    """Whether the robot stays clear of itself by `margin` along the whole loop, for an inequality.
+
+    The clearance of all pairs at samples, and as much more as a point of a capsule may come nearer between them. What
+    an answer keeps is proven by `Outcome.clearance`.
+
+    Args:
+        margin: least distance between any two parts of the robot [m].
+        samples: per edge; default 96 for the whole loop. More of them cost less clearance where edges are long.
+
+    Raises:
+        ValueError: if the margin is not one finite number, or `samples` not a positive integer.
+    """
+    wanted = checks.number("margin", margin, unit="m")
+    per_edge = None if samples is None else checks.whole("samples", samples)
+
+    def measure(outcome: Outcome) -> Array:
+        return clearance_shortfall(outcome.robot, outcome.path.waypoints, wanted, samples=per_edge, between=_BETWEEN)
+
+    return measure
 
 
 def bend_within(joint: int, name: str) -> Measure:

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array
+from reojax.collision.path_clearance import PathClearance, path_clearance
 from reojax.design.loops import Loops
 from reojax.design.variables import Space, Variable
 from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation
@@ -34,6 +35,11 @@ class Outcome:
     def rotation(self) -> Float[Array, "3 3"]:
         """Net rotation of the base after the loop."""
         return net_rotation(self.robot, self.path, steps=self.steps)
+
+    @cached_property
+    def clearance(self) -> PathClearance:
+        """Least clearance along the whole loop, proven."""
+        return path_clearance(self.robot, self.path)
 
 
 Measure = Callable[[Outcome], Any]
