@@ -18,7 +18,7 @@ from reojax.design.measures import (
     value_of as value_of,
     weighted as weighted,
 )
-from reojax.design.problem import Outcome as Outcome, Problem as Problem
+from reojax.design.problem import Outcome as Outcome, Problem as Problem, Solutions as Solutions
 from reojax.design.smooth import fourier_loops as fourier_loops, spline_loops as spline_loops
 from reojax.design.uncertainty import (
     Sensitivities as Sensitivities,

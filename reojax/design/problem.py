@@ -5,14 +5,15 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
-from reojax._internal.arrays import Array
+from reojax._internal import checks
+from reojax._internal.arrays import Array, as_numbers
 from reojax.collision.path_clearance import PathClearance, path_clearance
 from reojax.design.loops import Loops
 from reojax.design.variables import Space, Variable
@@ -43,7 +44,39 @@ class Outcome:
 
 
 Measure = Callable[[Outcome], Any]
-"""A quantity of a design: a scalar, or a vector (k,), traced by JAX."""
+"""A quantity of a design: a scalar, or a vector (k,), traced by JAX. Any function of an `Outcome` will do: it reads
+`.values` (by name, SI), `.robot`, `.path`, `.rotation` and `.clearance`."""
+Vector = Callable[[Array], Array]
+
+
+class Solutions(NamedTuple):
+    """Answers of k problems from s starts each; fields as those of `Solution`."""
+
+    value: Float[np.ndarray, "k s n"]
+    cost: Float[np.ndarray, "k s"]
+    residual: Float[np.ndarray, "k s"]
+    slope: Float[np.ndarray, "k s"]
+    steps: Int[np.ndarray, "k s"]
+    converged: Bool[np.ndarray, "k s"]
+    status: Int[np.ndarray, "k s"]
+    best: Int[np.ndarray, " k"]
+    """Which start is best for each problem: of least cost among the converged, else of least residual."""
+
+    def pick(self) -> Solution:
+        """The best answer of each problem, the problems in front."""
+        rows = np.arange(len(self.best)), self.best
+        fields = {name: value[rows] for name, value in self._asdict().items() if name != "best"}
+        cost = np.where(fields["converged"], fields["cost"], np.inf)
+        return Solution(**fields, best=int(np.argmin(cost if fields["converged"].any() else fields["residual"])))
+
+
+class _Limits(NamedTuple):
+    """What `optimise` is asked for."""
+
+    tolerance: float
+    slope_tolerance: float
+    max_steps: int
+    progress: str | None
 
 
 class Problem:
@@ -83,17 +116,32 @@ class Problem:
         def cost(x: Array) -> Array:
             return objective(self.outcome(x))
 
-        def gather(measures: Sequence[Measure], conditions: str) -> Callable[[Array], Array]:
-            def function(x: Array) -> Array:
-                outcome = self.outcome(x)
-                parts = [measure(outcome) for measure in measures]
-                parts += [getattr(loop, conditions)(outcome.values[loop.variable.name]) for loop in self.loops]
-                return jnp.concatenate([jnp.zeros(0, x.dtype), *(jnp.reshape(part, -1) for part in parts)])
-
-            return function
-
         self.cost = cost
-        self.equality, self.inequality = gather(equality, "equality"), gather(inequality, "inequality")
+        # measures and the loops' own conditions apart: the latter are cheap, and need no derivative of the rotation
+        self._equality = self._measured(equality), self._conditions("equality")
+        self._inequality = self._measured(inequality), self._conditions("inequality")
+
+    def _measured(self, measures: Sequence[Measure]) -> Vector:
+        def function(x: Array) -> Array:
+            outcome = self.outcome(x)
+            return _concatenate(x, [measure(outcome) for measure in measures])
+
+        return function
+
+    def _conditions(self, kind: str) -> Vector:
+        def function(x: Array) -> Array:
+            values = self.space.named(x)
+            return _concatenate(x, [getattr(loop, kind)(values[loop.variable.name]) for loop in self.loops])
+
+        return function
+
+    def equality(self, x: Array) -> Float[Array, " p"]:
+        """What must be 0 at a design (n,) in SI: the measures, then the conditions of the loops."""
+        return jnp.concatenate([function(x) for function in self._equality])
+
+    def inequality(self, x: Array) -> Float[Array, " q"]:
+        """What must not be positive."""
+        return jnp.concatenate([function(x) for function in self._inequality])
 
     def outcome(self, x: Array) -> Outcome:
         """Outcome of a design as a vector (n,) in SI."""
@@ -115,7 +163,10 @@ class Problem:
         *,
         seed: int = 0,
         hold: Mapping[str, ArrayLike] | None = None,
-        **options: Any,
+        tolerance: float = 1e-8,
+        slope_tolerance: float = 1e-6,
+        max_steps: int = 200,
+        progress: str | None = None,
     ) -> Solution:
         """Solve from many starts by `optimise`.
 
@@ -126,45 +177,116 @@ class Problem:
             starts: number of random starts, or (m, n) designs in SI.
             seed: of the random starts.
             hold: variables to keep at a value, in SI, by name.
-            options: of `optimise`.
+            tolerance: of `optimise`, and so are `slope_tolerance`, `max_steps` and `progress`.
+            slope_tolerance: largest slope.
+            max_steps: most steps of a start.
+            progress: what to write before a bar on stderr.
 
         Raises:
             ValueError: for an unknown name or a value outside of its bounds; and as `optimise`.
         """
-        x = self.starts(int(starts), seed=seed) if isinstance(starts, int | np.integer) else np.array(starts, float)
-        held = dict(hold or {})
-        answer = self._solve_held(x, held, options)
+        limits = _Limits(tolerance, slope_tolerance, max_steps, progress)
+        x, held = self._starts(starts, seed), dict(hold or {})
+        answer = self._solve_held(x, {name: np.asarray(value)[None] for name, value in held.items()}, limits)
         catalogues = {name: entries for name, entries in self.space.catalogues().items() if name not in held}
         if not catalogues:
             return answer
         best = self.space.named(answer.value[answer.best])
-        choices = [_neighbours(entries, float(best[name])) for name, entries in catalogues.items()]
-        answers = [
-            self._solve_held(answer.value, held | dict(zip(catalogues, choice, strict=True)), options)
-            for choice in itertools.product(*choices)
-        ]
-        return min(answers, key=lambda a: (not a.converged[a.best], a.cost[a.best]))
+        choices = list(itertools.product(*(_neighbours(e, float(best[name])) for name, e in catalogues.items())))
+        # every combination of entries from every start, side by side
+        each = {name: np.repeat([choice[i] for choice in choices], len(x)) for i, name in enumerate(catalogues)}
+        each |= {name: np.asarray(value)[None] for name, value in held.items()}
+        many = self._solve_held(np.tile(answer.value, (len(choices), 1)), each, limits)
+        first = many.best - many.best % len(x)  # of the combination with the best answer
+        fields = {name: value[first : first + len(x)] for name, value in many._asdict().items() if name != "best"}
+        return Solution(**fields, best=many.best - first)
 
-    def _solve_held(self, x: np.ndarray, held: Mapping[str, ArrayLike], options: Mapping[str, Any]) -> Solution:
-        lower, upper, x = self.space.lower.copy(), self.space.upper.copy(), x.copy()
+    def solve_each(
+        self,
+        holds: Mapping[str, ArrayLike],
+        starts: int | ArrayLike = 8,
+        *,
+        seed: int = 0,
+        tolerance: float = 1e-8,
+        slope_tolerance: float = 1e-6,
+        max_steps: int = 200,
+        progress: str | None = None,
+    ) -> Solutions:
+        """Solve many problems that differ by the values of some variables, side by side, each from every start.
+
+        A trade-off over targets, weights, limits or parameters, all of them variables that are held, is one call:
+
+            problem.solve_each({"target": targets, "gear ratio": np.linspace(1, 48, 13)})
+
+        Catalogues are not looked at.
+
+        Args:
+            holds: by name, the values (k, ...) in SI that a variable is kept at in each of the k problems; NaN in those
+                problems where it is free.
+            starts: number of random starts, or (m, n) designs in SI, the same for every problem.
+            seed: of the random starts.
+            tolerance: of `optimise`, and so are `slope_tolerance`, `max_steps` and `progress`.
+            slope_tolerance: largest slope.
+            max_steps: most steps of a start.
+            progress: what to write before a bar on stderr.
+
+        Raises:
+            ValueError: for no values, different numbers of them, an unknown name or a value outside of its bounds; and
+                as `optimise`.
+        """
+        counts = {name: np.shape(value)[0] if np.ndim(value) else 0 for name, value in holds.items()}
+        if len(set(counts.values())) != 1 or not all(counts.values()):
+            raise ValueError(f"`holds` has {counts or 'nothing'}; every variable needs one value for each problem.")
+        x, many = self._starts(starts, seed), next(iter(counts.values()))
+        each = {name: np.repeat(np.asarray(value, float), len(x), axis=0) for name, value in holds.items()}
+        limits = _Limits(tolerance, slope_tolerance, max_steps, progress)
+        found = self._solve_held(np.tile(x, (many, 1)), each, limits)
+        fields = {
+            name: value.reshape(many, len(x), *value.shape[1:])
+            for name, value in found._asdict().items()
+            if name != "best"
+        }
+        cost = np.where(fields["converged"], fields["cost"], np.inf)
+        best = np.where(fields["converged"].any(1), cost.argmin(1), fields["residual"].argmin(1))
+        return Solutions(**fields, best=best)
+
+    def _starts(self, starts: int | ArrayLike, seed: int) -> Float[np.ndarray, "m n"]:
+        if isinstance(starts, int | np.integer) and not isinstance(starts, bool):
+            return self.starts(checks.whole("starts", starts), seed=seed)
+        x = np.array(as_numbers("starts", starts), float)
+        x = x[None] if x.ndim == 1 else x
+        if x.shape[1:] != self.space.lower.shape or not len(x):
+            raise ValueError(f"`starts` has shape {x.shape}; it must be (m, {self.space.lower.size}).")
+        return x
+
+    def _solve_held(self, x: np.ndarray, held: Mapping[str, np.ndarray], limits: _Limits) -> Solution:
+        """Solve with variables held at values (1 or m, ...), free where they are NaN."""
+        lower, upper = np.tile(self.space.lower, (len(x), 1)), np.tile(self.space.upper, (len(x), 1))
+        x = x.copy()
         for name, value in held.items():
             place = self.space.place(name)
-            if not (np.all(lower[place] <= value) and np.all(value <= upper[place])):
-                raise ValueError(f"{name!r} is held at {value}, which is outside of its bounds (SI).")
-            lower[place] = upper[place] = value
-            if x.ndim == 2:
-                x[:, place] = value
+            part = np.broadcast_to(value.reshape(len(value), -1), x[:, place].shape)
+            fixed = ~np.isnan(part)
+            if (fixed & ~((lower[:, place] <= part) & (part <= upper[:, place]))).any():
+                values = checks.shorten(np.squeeze(value).tolist())
+                raise ValueError(f"{name!r} is held at {values}, which is outside of its bounds (SI).")
+            for array in (x, lower, upper):
+                array[:, place] = np.where(fixed, part, array[:, place])
         size = np.where(self.space.upper > self.space.lower, self.space.upper - self.space.lower, 1.0)
         return optimise(
             self.cost,
             x,
             lower=lower,
             upper=upper,
-            equality=self.equality,
-            inequality=self.inequality,
+            equality=self._equality,
+            inequality=self._inequality,
             scale=size,
-            **options,
+            **limits._asdict(),
         )
+
+
+def _concatenate(x: Array, parts: Sequence[Any]) -> Array:
+    return jnp.concatenate([jnp.zeros(0, x.dtype), *(jnp.reshape(part, -1) for part in parts)])
 
 
 def _neighbours(entries: np.ndarray, value: float) -> list[float]:

@@ -66,9 +66,11 @@ class Problem(NamedTuple):
         return self.programs.values(x * self.scale, owner)
 
     def derivatives(self, x: np.ndarray, owner: np.ndarray) -> tuple[Values, Derivatives]:
-        """By the scaled variables."""
+        """By the scaled variables; zero by those that are held, whatever the functions say."""
         values, slopes = self.programs.derivatives(x * self.scale, owner)
-        return values, Derivatives(slopes.gradient * self.scale, slopes.jacobian * self.scale)
+        free = (self.upper > self.lower)[owner]
+        gradient = np.where(free, slopes.gradient * self.scale, 0.0)
+        return values, Derivatives(gradient, np.where(free[:, None], slopes.jacobian * self.scale, 0.0))
 
 
 @dataclass
@@ -160,13 +162,12 @@ def _rows_of(ahead: tuple[Values, Derivatives], who: np.ndarray) -> tuple[Values
 
 
 def _begin(problem: Problem, x: np.ndarray, values: Values, slopes: Derivatives) -> Iterates:
-    """Before the first step. Scales are the largest derivatives by a variable that is not held."""
+    """Before the first step. Scales are the largest derivatives."""
     m, n = x.shape
     finite = _finite(values, *slopes)
-    free = problem.upper > problem.lower
-    steepest = np.abs(np.where(free & finite[:, None], slopes.gradient, 0.0)).max(1)
+    steepest = np.abs(np.where(finite[:, None], slopes.gradient, 0.0)).max(1)
     cost_scale = np.where(steepest > 0, steepest, 1.0)
-    steepest = np.abs(np.where((free & finite[:, None])[:, None], slopes.jacobian, 0.0)).max(2)
+    steepest = np.abs(np.where(finite[:, None, None], slopes.jacobian, 0.0)).max(2)
     row_scale = np.where(steepest > 0, np.maximum(steepest, _LEAST_SCALE), 1.0)
     q = row_scale.shape[1]
     return Iterates(
@@ -219,10 +220,10 @@ def _move(
     change = run.trial[to] - run.x[to]
     run.x[to], run.f[to], run.c[to] = run.trial[to], values.cost[taken], values.rows[taken]
     run.gradient[to], run.jacobian[to] = gradient[taken], jacobian[taken]
-    # curvature of the Lagrangian, with the multipliers of the program that led here; held variables stay out of it
+    # curvature of the Lagrangian, with the multipliers of the program that led here
     begun = run.steps[to] > 0
     measured = begun & ~run.restoring[to]
-    turn = np.where(problem.upper > problem.lower, 1.0, 0.0)[to] * (_lagrangian_gradient(run, to) - before)
+    turn = _lagrangian_gradient(run, to) - before
     who = to[measured]
     run.hessian[who], run.fresh[who] = update(run.hessian[who], run.fresh[who], change[measured], turn[measured])
     run.damping[to], run.chosen[to] = 1.0, False

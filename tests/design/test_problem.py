@@ -8,6 +8,7 @@ import pytest
 import reojax
 from reojax import design, joint_travel, so3
 from reojax.design import Problem, Variable
+from reojax.optimisation.status import Status
 from reojax.robots.random import random_robot
 
 ROBOT = random_robot(3, 3, limits=(-1.5, 2.0)).replace(layout=reojax.FOUR_BODY)
@@ -193,7 +194,7 @@ ROLL = Problem(
     objective=lambda o: design.travel()(o) + 0.02 * o.values["gear"],
     equality=[design.turned_about([0, 0, 1], np.deg2rad(100))],
     inequality=[design.off_axis_within([0, 0, 1], np.deg2rad(5))],
-    steps=1,
+    steps=4,
 )
 
 
@@ -213,9 +214,47 @@ def test_a_design_with_a_catalogue():
     np.testing.assert_allclose(found.cost[found.best], min(costs), rtol=1e-6)
 
 
+def test_many_problems_side_by_side_are_those_solved_alone():
+    """A trade-off over the gear ratio, the twist held in one problem and free in the others."""
+    gears, twist = np.array([4.0, 9.0, 24.0]), np.array([np.nan, np.deg2rad(200), np.nan])
+    each = ROLL.solve_each({"gear": gears, "twist": twist}, 4, seed=3)
+    assert each.value.shape == (3, 4, 3)
+    picked = each.pick()
+    for k in range(3):
+        hold = {"gear": gears[k]} | ({} if np.isnan(twist[k]) else {"twist": twist[k]})
+        alone = ROLL.solve(4, seed=3, hold=hold)
+        np.testing.assert_array_equal(alone.converged, each.converged[k])
+        np.testing.assert_allclose(alone.value, each.value[k], rtol=1e-12)
+        assert alone.best == each.best[k]
+        np.testing.assert_allclose(picked.cost[k], alone.cost[alone.best], rtol=1e-12)
+    np.testing.assert_allclose(picked.value[:, 2], gears, rtol=1e-12)
+
+
+def test_held_variables_have_no_influence():
+    """A target 0.283 degrees away is reached whether it is a matrix or the value of a variable with wide bounds."""
+    near = PROTOTYPE.replace(lower=np.full(3, -np.deg2rad(20)), upper=np.full(3, np.deg2rad(20)))
+    loop, vector = design.polygons(near, 3), np.deg2rad([0.021, 0.03, -0.281])
+    target = Variable("target", [-3.2] * 3, [3.2] * 3, "rad")
+
+    def problem(variables, aim):
+        build = lambda values: (near, loop.path(values["loop"]))
+        objective = design.travel(loop)
+        return Problem(build, variables, objective=objective, equality=[design.turned_to(aim)], steps=2)
+
+    held, fixed = problem([loop, target], "target"), problem([loop], np.asarray(so3.exp(vector)))
+    starts = fixed.starts(8, seed=0)
+    ours = held.solve(np.concatenate([starts, np.zeros((8, 3))], axis=1), hold={"target": vector})
+    theirs = fixed.solve(starts)
+    assert ours.converged.sum() >= 7
+    np.testing.assert_array_equal(ours.converged, theirs.converged)
+    # rounding may send a start to another local answer
+    assert (abs(ours.cost / theirs.cost - 1) < 1e-6).sum() >= 7
+
+
 def test_unreachable_roll_says_by_how_much():
     far = ROLL.solve(8, seed=3, hold={"twist": np.deg2rad(30), "gear": 24.0})
     assert not far.converged.any()
+    assert (far.status == Status.INFEASIBLE).all()
     values = ROLL.space.named(far.value[far.best])
     np.testing.assert_allclose(values["twist"], np.deg2rad(30), atol=1e-12)
     assert 0.5 < far.residual[far.best] < np.deg2rad(100)
@@ -226,6 +265,10 @@ def test_unreachable_roll_says_by_how_much():
     [
         (lambda: ROLL.solve(8, hold={"ratio": 3.0}), "no variable 'ratio'.*twist, bend, gear"),
         (lambda: ROLL.solve(8, hold={"gear": 99.0}), "'gear' is held at 99"),
+        (lambda: ROLL.solve_each({}), "`holds` has nothing"),
+        (lambda: ROLL.solve_each({"gear": [4.0], "twist": [1.0, 2.0]}), "`holds` has {'gear': 1, 'twist': 2}"),
+        (lambda: ROLL.solve(0), "`starts` is 0"),
+        (lambda: ROLL.solve(np.zeros((2, 5))), r"`starts` has shape \(2, 5\); it must be \(m, 3\)"),
         (lambda: ROLL.space.vector({"twist": 1, "bend": 1, "gears": 2}), "no variable 'gears'"),
         (lambda: ROLL.space.vector({"twist": 1, "bend": 1}), "'gear' is missing"),
         (lambda: ROLL.space.vector({"twist": [1, 2], "bend": 1, "gear": 1}), "`twist` has shape"),

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from reojax.design import descend, optimise
+from reojax.optimisation.status import Status
 
 STARTS = np.random.default_rng(0).uniform(1, 5, (8, 4))
 
@@ -111,6 +112,66 @@ def test_a_held_variable_and_one_without_bounds():
     np.testing.assert_allclose(slope(found.value[0, 2]), 0, atol=1e-5)
 
 
+def test_what_is_held_has_no_influence():
+    """Whatever the held variable's derivatives and bounds are, the answers of the others stay the same."""
+
+    def cost(x, steep):
+        return (x[0] - 0.3) ** 2 + x[0] * x[1] + steep * x[2]
+
+    def line(x, steep):
+        return jnp.array([x[0] + 2 * x[1] - 1 + steep * (x[2] - 0.5)])
+
+    starts = np.array([[0.1, 0.9, 0.5], [0.8, 0.2, 0.5]])
+    lower, upper = [0, 0, 0.5], [1, 1, 0.5]
+    answers = [
+        optimise(cost, starts, lower=lower, upper=upper, equality=line, data=np.full(2, steep), scale=scale)
+        for steep, scale in ((0.0, 1.0), (1e6, 1.0), (1e6, [1.0, 1.0, 6.4]))
+    ]
+    for other in answers[1:]:
+        assert other.converged.all()
+        np.testing.assert_allclose(other.value, answers[0].value, atol=1e-9)
+        np.testing.assert_allclose(other.slope, answers[0].slope, atol=1e-9)
+        np.testing.assert_array_equal(other.steps, answers[0].steps)
+
+
+def test_bounds_for_every_start():
+    found = optimise(
+        lambda x: (x**2).sum(), [[0.5, 0.5], [0.5, 3.0]], lower=[[0.1, 0.2], [0.4, 3.0]], upper=[[1.0, 1.0], [1.0, 3.0]]
+    )
+    assert found.converged.all()
+    np.testing.assert_allclose(found.value, [[0.1, 0.2], [0.4, 3.0]], atol=1e-9)
+
+
+def test_several_constraint_functions_are_one_after_the_other():
+    one = optimise(product_cost, STARTS, **HS71)
+    apart = HS71 | {"equality": (forty, lambda x: jnp.zeros(0)), "inequality": (lambda x: jnp.zeros(0), at_least_25)}
+    np.testing.assert_allclose(optimise(product_cost, STARTS, **apart).value, one.value, atol=1e-9)
+
+
+def test_statuses_say_why():
+    short = optimise(product_cost, STARTS, **HS71, max_steps=1)
+    assert (short.status == Status.OUT_OF_STEPS).all()
+    assert (short.steps == 1).all()
+    assert short.message[0].startswith("out of steps")
+    far = optimise(jnp.sum, [0.5], lower=0, upper=1, equality=lambda x: x - 4)
+    assert far.status[0] == Status.INFEASIBLE
+    np.testing.assert_array_equal(far.violation, far.residual)
+    lost = optimise(lambda x: jnp.log(x[0]), [-1.0], lower=-2, upper=2)
+    assert lost.status[0] == Status.NOT_FINITE
+
+
+def test_a_start_is_moved_out_of_a_local_least_of_the_violations():
+    """x^4 - x^2 = 2 has a local least of its violation at 0, where the gradient vanishes, and two roots."""
+    found = optimise(lambda x: x[0], [0.0], lower=-3, upper=3, equality=lambda x: x**4 - x**2 - 2)
+    assert found.converged.all()
+    np.testing.assert_allclose(abs(found.value), np.sqrt(2), atol=1e-7)
+
+
+def test_no_start_depends_on_the_others():
+    together = optimise(product_cost, STARTS, **HS71)
+    np.testing.assert_allclose(optimise(product_cost, STARTS[3:5], **HS71).value, together.value[3:5], atol=1e-9)
+
+
 def test_redundant_constraints_and_a_corner():
     """More active constraints than variables, twice the same equality, and a linear cost."""
     found = optimise(
@@ -126,6 +187,8 @@ def test_redundant_constraints_and_a_corner():
 
 
 def test_single_precision():
+    with pytest.warns(UserWarning, match="jax_enable_x64"):
+        optimise(product_cost, STARTS[:1].astype(np.float32), **HS71, max_steps=1)
     found = optimise(product_cost, STARTS.astype(np.float32), **HS71, tolerance=1e-4, slope_tolerance=1e-3)
     assert found.value.dtype == np.float32
     assert found.converged.any()
@@ -179,6 +242,11 @@ def test_descent_in_a_box_with_a_kink():
         ({"equality": lambda x: x[0]}, r"`equality` returns an array of shape \(\)"),
         ({"tolerance": 0.0}, "`tolerance` is 0.0"),
         ({"max_steps": 0}, "`max_steps` is 0"),
+        ({"cost": lambda x: x[0] > 1}, "`cost` returns bool"),
+        ({"cost": lambda x: jnp.int32(3)}, "`cost` returns int32"),
+        ({"inequality": lambda x: x > 1}, "`inequality` returns bool"),
+        ({"lower": np.ones((3, 4))}, r"`lower` has shape \(3, 4\)"),
+        ({"max_steps": True}, "`max_steps` is True"),
         ({"data": np.zeros(3), "cost": lambda x, d: x[0]}, r"`data` has an array of shape \(3,\)"),
     ],
 )
