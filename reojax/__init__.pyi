@@ -36,6 +36,7 @@ from reojax.motion.trajectory import Trajectory, along, through
 from reojax.path import Path, joint_travel, polygon
 from reojax.planning.free_path import FreePaths, free_path, free_paths
 from reojax.planning.plan import plan, plan_many, replan
+from reojax.planning.plan_file import SavedPlan, load_plan, save_plan
 from reojax.planning.result import Plan
 from reojax.robot import Robot, layout_of, make_robot
 from reojax.steering.gains import CorrectionGains as CorrectionGains, correction_gains as correction_gains
@@ -87,6 +88,7 @@ __all__ = [
     "Layout",
     "layout_of",
     "LeastTime",
+    "load_plan",
     "link_poses",
     "LinkPoses",
     "load_robot",
@@ -126,6 +128,8 @@ __all__ = [
     "Robot",
     "robots",
     "rotation_history",
+    "save_plan",
+    "SavedPlan",
     "Sampled",
     "simulate",
     "save_robot",

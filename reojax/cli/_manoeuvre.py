@@ -4,20 +4,40 @@ import argparse
 from typing import TYPE_CHECKING
 
 from reojax.cli._arguments import degrees
+from reojax.cli._plan_file import add_plan_file, saved_plan
+from reojax.cli._robot import add_robot, robot_of
 
 if TYPE_CHECKING:
     from reojax.path import Path
     from reojax.robot import Robot
 
 
-def add_manoeuvre(parser: argparse.ArgumentParser) -> None:
-    """Declare the options that say which manoeuvre of which robot."""
+def add_manoeuvre(parser: argparse.ArgumentParser, *, plan: bool = True) -> None:
+    """Declare the options that say which manoeuvre of which robot; with `plan`, or which plan."""
     add = parser.add_argument
     parts = "a: the distal joints twist opposite ways; b: the same way [%(default)s]"
     add("--manoeuvre", choices=("a", "b"), default="a", help=parts)
     add("--twist", type=degrees, default=270.0, metavar="DEG", help="twist of the distal joints [%(default)g]")
     add("--bend", type=degrees, default=120.0, metavar="DEG", help="bend of the centre joint [%(default)g]")
-    add("--robot", default="prototype", metavar="NAME", help="robot; a wrong name lists them [%(default)s]")
+    add_robot(parser)
+    if plan:
+        add_plan_file(parser)
+
+
+def robot_and_path(args: argparse.Namespace) -> tuple["Robot", "Path"]:
+    """The robot and its path: of `--plan` all runs, otherwise the manoeuvre.
+
+    Raises:
+        ValueError: for a file that is no plan or no robot, or a robot that the manoeuvres are not laid out for.
+    """
+    saved = saved_plan(args)
+    if saved is None:
+        robot = robot_of(args.robot)
+        return robot, path_of(robot, args)
+    args.robot, args.runs = saved.robot.name, saved.repeats
+    if not saved.travel:
+        raise ValueError(f"nothing moves in the plan {args.plan!r}.")
+    return saved.robot, saved.path
 
 
 def path_of(robot: "Robot", args: argparse.Namespace) -> "Path":
@@ -35,15 +55,20 @@ def path_of(robot: "Robot", args: argparse.Namespace) -> "Path":
     return manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), layout_of(robot))
 
 
-def edge_names(robot: "Robot") -> tuple[str, ...]:
-    """What the robot does on each edge of a manoeuvre."""
+def edge_names(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[str, ...]:
+    """What the robot does on each edge of a manoeuvre, or the number of each edge of a plan."""
     from reojax.robot import layout_of
 
+    if args.plan is not None:
+        return tuple(f"edge {k}" for k in range(1, path.edges + 1))
     names = ("bend", "twist", "unbend", "untwist")
     return names if layout_of(robot).fold is None else ("fold", *names, "unfold")
 
 
 def heading(args: argparse.Namespace) -> str:
-    """The manoeuvre in a line."""
+    """The manoeuvre, or the plan, in a line."""
+    if getattr(args, "runs", None) is not None:
+        runs = f", {args.runs} runs" if args.runs > 1 else ""
+        return f"Plan {args.plan} on {args.robot}{runs}"
     angles = f"twist {args.twist:g} deg, bend {args.bend:g} deg"
     return f"Manoeuvre {args.manoeuvre.upper()} on {args.robot}: {angles}"

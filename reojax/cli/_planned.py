@@ -8,6 +8,7 @@ from reojax.cli._arguments import SHORTEST, degrees
 
 if TYPE_CHECKING:
     from reojax.motion.trajectory import Trajectory
+    from reojax.path import Path
     from reojax.robot import Robot
 
 
@@ -22,8 +23,8 @@ def add_plan(parser: argparse.ArgumentParser, *, manoeuvre: str | None) -> None:
     add("--duration", type=_durations, metavar="S[,S...]", help="seconds of each edge, or one number for all")
 
 
-def plan_motion(robot: "Robot", args: argparse.Namespace) -> "Trajectory":
-    """Trajectory of the joints that the options ask for.
+def plan_motion(robot: "Robot", args: argparse.Namespace, path: "Path | None" = None) -> "Trajectory":
+    """Trajectory of the joints that the options ask for, along `path` or their manoeuvre.
 
     Raises:
         ValueError: if the robot has no such manoeuvre, or law or durations are none.
@@ -35,9 +36,10 @@ def plan_motion(robot: "Robot", args: argparse.Namespace) -> "Trajectory":
     from reojax.robot import layout_of
 
     if args.duration is None:
-        raise ValueError("--duration is missing: seconds for each edge of the manoeuvre, or one number for all.")
-    manoeuvre = {"a": manoeuvre_a, "b": manoeuvre_b}[args.manoeuvre]
-    path = manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), layout_of(robot))
+        raise ValueError("--duration is missing: seconds for each edge, or one number for all.")
+    if path is None:
+        manoeuvre = {"a": manoeuvre_a, "b": manoeuvre_b}[args.manoeuvre]
+        path = manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), layout_of(robot))
     durations = args.duration[0] if len(args.duration) == 1 else np.array(args.duration)
     return along(path, args.law, durations)
 

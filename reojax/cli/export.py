@@ -6,9 +6,12 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, version
+from reojax.cli._plan_file import add_plan_file, saved_plan
 from reojax.cli._planned import add_plan, plan_motion
+from reojax.cli._robot import add_robot, robot_of
 
 if TYPE_CHECKING:
+    from reojax.path import Path
     from reojax.robot import Robot
 
 LARGEST = 1_000_000
@@ -19,7 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `reojax export`."""
     add = parser.add_argument
     add("file", metavar="FILE", help="to write: .csv, or .yaml, .yml or .json for ROS 2")
-    add("--robot", default="prototype", metavar="NAME", help="robot; a wrong name lists them [%(default)s]")
+    add_robot(parser)
+    add_plan_file(parser)
     add_plan(parser, manoeuvre="a")
     add("--rate", type=_positive, default=200.0, metavar="HZ", help="points per second, about [%(default)g]")
     add("--delay", type=_delay, default=0.0, metavar="S", help="time before the first point [%(default)g]")
@@ -29,27 +33,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Compute, write, and print what was written."""
-    from reojax import robots, session
+    from reojax import session
     from reojax.files.trajectories import check_trajectory
 
     session.start()
     try:
         check_trajectory(args.file)
-        report = _write(robots.by_name(args.robot), args)
+        saved = saved_plan(args)
+        robot, path = (robot_of(args.robot), None) if saved is None else (saved.robot, saved.path)
+        report = _write(robot, path, args)
     except ValueError as error:
         raise BadInput(f"reojax export: {error}") from error
     text = f"{report['points']} points in {report['duration_s']:.6g} s, written to {args.file}"
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else text)
 
 
-def _write(robot: "Robot", args: argparse.Namespace) -> dict[str, Any]:
+def _write(robot: "Robot", path: "Path | None", args: argparse.Namespace) -> dict[str, Any]:
     import jax
     import numpy as np
 
     from reojax.files.trajectories import write_trajectory
     from reojax.mechanics.dynamics import inverse_dynamics
 
-    trajectory = plan_motion(robot, args)
+    trajectory = plan_motion(robot, args, path)
     duration = float(trajectory.duration)
     steps = math.ceil(duration * args.rate - 1e-9)
     if steps >= LARGEST:
@@ -64,7 +70,8 @@ def _write(robot: "Robot", args: argparse.Namespace) -> dict[str, Any]:
         "command": "export",
         "version": version(),
         "config": {
-            "robot": args.robot,
+            "robot": robot.name if args.plan else args.robot,
+            "plan": args.plan,
             "manoeuvre": args.manoeuvre,
             "twist_deg": args.twist,
             "bend_deg": args.bend,

@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, degrees, version
+from reojax.cli._free import add_free, asked, free
 from reojax.cli._page import add_page, check_page, write_page
+from reojax.cli._robot import add_robot, robot_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,17 +26,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `reojax plan`."""
     add = parser.add_argument
     forms = "'rotvec X Y Z' or 'zxz A B C' in degrees, 'quat W X Y Z', or 'matrix FILE' with three rows of three"
-    add("--target", required=True, metavar="TARGET", help=f"rotation of the base: {forms}")
-    add("--robot", default="prototype", metavar="NAME", help="robot; a wrong name lists them [%(default)s]")
-    add("--twist-limit", type=degrees, default=270.0, metavar="DEG", help="of the distal joints [%(default)g]")
-    add("--bend-limit", type=degrees, default=120.0, metavar="DEG", help="of the centre joint [%(default)g]")
+    add("--target", required=True, nargs="+", metavar="TARGET", help=f"rotation of the base: {forms}")
+    add_robot(parser)
+    add("--twist-limit", type=degrees, metavar="DEG", help="of the distal joints [270]")
+    add("--bend-limit", type=degrees, metavar="DEG", help="of the centre joint [120]")
     add("--max-manoeuvres", type=int, default=5, metavar="N", help="manoeuvres allowed [%(default)d]")
     parts = "count: fewest manoeuvres; travel: least joint travel [%(default)s]"
     add("--objective", choices=("count", "travel"), default="count", help=parts)
-    words = "manoeuvres: A and B; rectangles: each distal joint its own amplitude; free: one closed path of little"
-    words += " joint travel, whatever --max-manoeuvres and --objective say [%(default)s]"
-    add("--vocabulary", choices=("manoeuvres", "rectangles", "free"), default="manoeuvres", help=words)
-    add("--corners", type=int, default=8, metavar="N", help="free corners of a free path [%(default)d]")
+    words = "manoeuvres: A and B; rectangles: each distal joint its own amplitude; free: one path of little joint"
+    words += " travel, whatever --max-manoeuvres and --objective say [manoeuvres, free for a robot without a layout]"
+    add("--vocabulary", choices=("manoeuvres", "rectangles", "free"), help=words)
+    add_free(parser)
+    add("--save", metavar="PLAN.json", help="write robot, path, target and certificate, for `reojax simulate --plan`")
     add("--json", action="store_true", help="print one JSON object, with all digits")
     add("--out", metavar="FIGURE", help="draw the orientation on its way to a .png, .pdf or .svg")
     add("--animate", metavar="FILM", help="draw the robot on its way to an .mp4 (needs ffmpeg) or a .gif")
@@ -44,12 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Compute, write the files, and print."""
-    from reojax import robots, session
+    from reojax import session
 
     session.start()
+    args.target = " ".join(args.target)
     try:
-        robot = robots.by_name(args.robot)
         target = read_target(args.target)
+        robot = robot_of(args.robot)
+        _choose(robot, args)
         _check_files(args)
         check_page(args)
         plan = _plan(robot, target, args)
@@ -112,8 +117,17 @@ def _read_matrix(name: str) -> "np.ndarray":
     return np.array(numbers).reshape(3, 3)
 
 
+def _choose(robot: "Robot", args: argparse.Namespace) -> None:
+    """Decide what the plan is made of, where that is not said."""
+    given = asked(args)
+    if args.vocabulary is None:
+        args.vocabulary = "free" if robot.layout is None or given else "manoeuvres"
+    if args.vocabulary != "free" and given:
+        raise ValueError(f"argument {given[0]}: it is for free paths, not for {args.vocabulary}.")
+
+
 def _check_files(args: argparse.Namespace) -> None:
-    from reojax._internal.files import check_writable
+    from reojax._internal.files import check_ending, check_writable
 
     if args.out is not None or args.animate is not None:
         from reojax import plot
@@ -122,6 +136,8 @@ def _check_files(args: argparse.Namespace) -> None:
             plot.check_picture(args.out)
         if args.animate is not None:
             plot.check_animation(args.animate)
+    if args.save is not None:
+        check_ending(args.save, "plan", ("json",))
     if args.csv is not None:
         if not args.csv.endswith(".csv"):
             raise ValueError(f"cannot write {args.csv!r}: the name of a table ends in .csv.")
@@ -131,13 +147,14 @@ def _check_files(args: argparse.Namespace) -> None:
 def _plan(robot: "Robot", target: "np.ndarray", args: argparse.Namespace) -> "Plan | FreePaths":
     import numpy as np
 
-    from reojax.planning import free_path, plan
-
-    twist_limit, bend_limit = float(np.deg2rad(args.twist_limit)), float(np.deg2rad(args.bend_limit))
     if args.vocabulary == "free":
-        return free_path(
-            robot, target, twist_limit=twist_limit, bend_limit=bend_limit, corners=args.corners, progress=True
-        )
+        return free(robot, target, args)
+    from reojax.planning import plan
+
+    twist_limit, bend_limit = (
+        float(np.deg2rad(default if limit is None else limit))
+        for limit, default in ((args.twist_limit, 270.0), (args.bend_limit, 120.0))
+    )
     return plan(
         robot,
         target,
@@ -159,6 +176,10 @@ def _write_files(robot: "Robot", plan: "Plan | FreePaths", target: "np.ndarray",
         rows += [",".join(f"{angle:.12g}" for angle in corner) for corner in np.rad2deg(plan.waypoints)]
         with replacing(args.csv) as file:
             file.write(("\n".join(rows) + "\n").encode())
+    if args.save is not None:
+        from reojax.planning.plan_file import save_plan
+
+        save_plan(plan, args.save, robot=robot, target=target)
     if not plan.travel:  # nothing moves, so there is nothing to draw
         return
     if args.out is not None:
@@ -202,15 +223,18 @@ def _report(robot: "Robot", plan: "Plan | FreePaths", target: "np.ndarray", args
             for name, t, b, last in parts
         ],
         "waypoints_rad": plan.waypoints.tolist(),
+        "repeats": int(getattr(plan, "repeats", 1)),
         "rotation_matrix": plan.rotation.tolist(),
         "error_rad": float(plan.error),
         "error_deg": float(np.rad2deg(plan.error)),
         "travel_deg": float(np.rad2deg(plan.travel)),
         "converged": bool(plan.converged),
+        "status": str(plan.status),
         "picture": args.out if drawn else None,
         "animation": args.animate if drawn else None,
         "page": args.html if drawn else None,
         "csv": args.csv,
+        "plan": args.save,
     }
 
 
@@ -218,7 +242,8 @@ def _text(report: dict[str, Any]) -> str:
     title = f"{report['config']['target']} on {report['config']['robot']}"
     free = report["config"]["vocabulary"] == "free"
     if free and report["travel_deg"]:
-        lines = [f"Closed path for {title}", "", *_corners(report)]
+        runs = f", to be run {report['repeats']} times" if report["repeats"] > 1 else ""
+        lines = [f"Path for {title}{runs}", "", *_corners(report)]
     elif report["manoeuvres"]:
         lines = [f"Plan for {title}: {len(report['manoeuvres'])} manoeuvres", "", *_loops(report["manoeuvres"])]
     else:
@@ -230,9 +255,9 @@ def _text(report: dict[str, Any]) -> str:
     else:
         what = "path" if free else "plan"
         lines.append(f"NOT reached: {report['error_deg']:.4f} deg ({error}) are left; this is the closest {what}")
-    lines += [
-        f"{what} in {report[what]}" for what in ("picture", "animation", "page", "csv") if report[what] is not None
-    ]
+        lines.append(report["status"])
+    files = ("picture", "animation", "page", "csv", "plan")
+    lines += [f"{what} in {report[what]}" for what in files if report[what] is not None]
     return "\n".join(lines)
 
 

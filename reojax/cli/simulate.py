@@ -5,7 +5,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, version
-from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, path_of
+from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path
 from reojax.cli._motion import LAW, check_law, motion_of, motion_report, motion_text
 from reojax.cli._motors import add_motors, momentum, seconds
 from reojax.cli._page import add_page, check_page, write_page
@@ -35,12 +35,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Compute, write the picture, and print."""
-    from reojax import robots, session
+    from reojax import session
 
     session.start()
     try:
-        robot = robots.by_name(args.robot)
-        path = path_of(robot, args)
+        robot, path = robot_and_path(args)
         check_law(args)
         if args.out is not None:
             _check_picture(args.out)
@@ -72,7 +71,9 @@ def _draw(robot: "Robot", path: "Path", history: Any, motion: "Motion | None", a
 
     title = _title(args)
     if motion is None:
-        figure = plot.history_figure(robot, path, title=title, edge_names=edge_names(robot), rotations=history)
+        figure = plot.history_figure(
+            robot, path, title=title, edge_names=edge_names(robot, path, args), rotations=history
+        )
     else:
         figure = plot.motion_figure(robot, motion, title=f"{title}, {args.law or LAW}")
     plot.save(figure, args.out)
@@ -107,6 +108,7 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
         "version": version(),
         "config": {
             "robot": args.robot,
+            "plan": args.plan,
             "manoeuvre": args.manoeuvre,
             "twist_deg": args.twist,
             "bend_deg": args.bend,

@@ -5,7 +5,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, version
-from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, path_of
+from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path
 from reojax.cli._motors import add_motors, motor_at
 
 if TYPE_CHECKING:
@@ -24,14 +24,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Compute, write the picture, and print."""
-    from reojax import robots, session
+    from reojax import session
     from reojax.motion.time_laws import by_name
 
     session.start()
     try:
         by_name(args.law)
-        robot = robots.by_name(args.robot)
-        path = path_of(robot, args)
+        robot, path = robot_and_path(args)
         if args.out is not None:
             from reojax import plot
 
@@ -59,7 +58,7 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
     motion = simulate(robot, path, args.law, durations=durations, motors=motors, samples=64)
     pieces = (len(motion.time) - 1) // path.edges
     edges = []
-    for e, name in enumerate(edge_names(robot)):
+    for e, name in enumerate(edge_names(robot, path, args)):
         part, k = slice(e * pieces, (e + 1) * pieces + 1), int(least.joint[e])
         peak = {key: float(np.abs(np.asarray(getattr(motion, key))[part, k]).max()) for key in _PEAKS}
         moves = bool(durations[e] > 0)
@@ -78,6 +77,7 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
         "version": version(),
         "config": {
             "robot": args.robot,
+            "plan": args.plan,
             "manoeuvre": args.manoeuvre,
             "twist_deg": args.twist,
             "bend_deg": args.bend,

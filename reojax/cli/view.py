@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from reojax.cli._arguments import BadInput
 from reojax.cli._manoeuvre import add_manoeuvre, heading, path_of
 from reojax.cli._motors import seconds
+from reojax.cli._robot import robot_of
 
 if TYPE_CHECKING:
     from reojax.path import Path
@@ -20,8 +21,8 @@ _HOUR = 3600
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `reojax view`."""
     add = parser.add_argument
-    add("plan", nargs="?", metavar="PLAN.json", help="what `reojax plan --json` printed, instead of a manoeuvre")
-    add_manoeuvre(parser)
+    add("plan", nargs="?", metavar="PLAN.json", help="what `reojax plan --save` wrote or --json printed")
+    add_manoeuvre(parser, plan=False)
     add("--duration", type=seconds, metavar="S", help="run it in this time, by a quintic law")
     add("--beside", metavar="PLAN.json", help="another plan for the same robot, shown beside it")
     add("--title", metavar="TEXT", help="headline of the page")
@@ -36,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Write the page and say where it is, or serve until interrupted."""
-    from reojax import robots, session
+    from reojax import session
     from reojax._internal.files import check_ending
 
     session.start()
@@ -44,7 +45,7 @@ def run(args: argparse.Namespace) -> None:
         if args.live:
             if args.out is not None or args.plan is not None or args.beside is not None:
                 raise ValueError("argument --live: it shows the robot alone, without PLAN.json, --beside or --out")
-            _serve(robots.by_name(args.robot), args.port)
+            _serve(robot_of(args.robot), args.port)
             return
         out = args.out or "turn.html"
         check_ending(out, "page", ("html", "htm"))
@@ -57,13 +58,12 @@ def run(args: argparse.Namespace) -> None:
 def _write(args: argparse.Namespace, out: str) -> File:
     import numpy as np
 
-    from reojax import robots
     from reojax.motion.simulation import simulate
     from reojax.viewer import view
 
     plan = None if args.plan is None else read_plan(args.plan)
     name = args.robot if plan is None else plan["config"]["robot"]
-    robot = robots.by_name(name)
+    robot = robot_of(args.robot) if plan is None else _robot(plan)
     shown: list[Any] = [path_of(robot, args) if plan is None else _path(robot, plan, str(args.plan))]
     names = [_title(args) if plan is None else str(plan["config"].get("target", args.plan))]
     if args.beside is not None:
@@ -97,7 +97,7 @@ def _title(args: argparse.Namespace) -> str:
 
 
 def read_plan(name: str) -> dict[str, Any]:
-    """What `reojax plan --json` printed to a file.
+    """What `reojax plan --save` wrote, or --json printed to a file.
 
     Raises:
         ValueError: if it cannot be read, or is something else.
@@ -108,6 +108,16 @@ def read_plan(name: str) -> dict[str, Any]:
         raise ValueError(f"cannot read the plan {name!r}: {error.strerror or error}.") from error
     except (ValueError, RecursionError) as error:
         raise ValueError(f"cannot read the plan {name!r}: it is not JSON.") from error
+    if isinstance(report, dict) and report.get("format") == "reojax plan":
+        from reojax.planning.plan_file import load_plan
+
+        saved = load_plan(name)
+        return {
+            "config": {"robot": saved.robot.name},
+            "robot": saved.robot,
+            "waypoints_rad": saved.path.waypoints,
+            "target_matrix": saved.rotation if saved.target is None else saved.target,
+        }
     keys = ("config", "waypoints_rad", "target_matrix")
     if not isinstance(report, dict) or any(key not in report for key in keys):
         raise ValueError(
@@ -116,6 +126,10 @@ def read_plan(name: str) -> dict[str, Any]:
     if not isinstance(report["config"], dict) or not isinstance(report["config"].get("robot"), str):
         raise ValueError(f"{name!r} is not a plan: its config must name the robot.")
     return report
+
+
+def _robot(plan: dict[str, Any]) -> "Robot":
+    return plan["robot"] if "robot" in plan else robot_of(plan["config"]["robot"])
 
 
 def _path(robot: "Robot", plan: dict[str, Any], name: str) -> "Path":

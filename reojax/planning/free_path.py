@@ -49,6 +49,14 @@ class FreePaths(NamedTuple):
     clearance: Any
     """Least distance of the robot's parts along the path, proven [m], (m,) of many; None if it was not asked for."""
 
+    def __str__(self) -> str:
+        """Corners, runs, and how the path ends; of many paths how many are reached."""
+        if np.ndim(self.error):
+            return f"{len(self.error)} paths, {int(np.sum(self.converged))} of them reach their targets"
+        runs = f"{self.repeats} runs" if self.repeats > 1 else "one run"
+        figures = f"error {self.error:.1e} rad, joint travel {np.rad2deg(self.travel):.1f} deg"
+        return f"path of {len(self.waypoints)} corners, {runs}: {figures}; {self.status}"
+
 
 def free_path(
     robot: Robot,

@@ -37,6 +37,22 @@ class Plan(NamedTuple):
     """Number of manoeuvres."""
     converged: Bool[np.ndarray, "*m"]
     """Whether `error` is within the tolerance."""
+    status: Any
+    """In words: converged; not found, which proves nothing; or unreachable in principle. Array (m,) of many plans."""
+    clearance: Any
+    """Least distance of the robot's parts along the path, proven [m], (m,) of many; None if it was not asked for."""
+
+    def __str__(self) -> str:
+        """The word with its amplitudes, and how it ends; of many plans how many are reached."""
+        if np.ndim(self.error):
+            return f"{len(self.error)} plans, {int(np.sum(self.converged))} of them reach their targets"
+        loops = [
+            f"{name}({np.rad2deg(twist):.4f}, {np.rad2deg(bend):.4f})"
+            for name, twist, bend in zip(self.word, self.twist, self.bend, strict=True)
+        ]
+        word = " ".join(loops) if len(loops) <= 12 else f"{' '.join(loops[:12])} ... ({len(loops)} manoeuvres)"
+        figures = f"error {self.error:.1e} rad, joint travel {np.rad2deg(self.travel):.1f} deg"
+        return f"{word or 'nothing to do'} [deg]: {figures}; {self.status}"
 
 
 def plans(scene: Context, rows: Candidates, targets: np.ndarray, tolerance: float) -> Plan:
@@ -73,13 +89,25 @@ def plans(scene: Context, rows: Candidates, targets: np.ndarray, tolerance: floa
         travel=np.array([np.abs(np.diff(path, axis=0)).sum() for path in corners]).reshape(m),
         manoeuvres=length,
         converged=error <= tolerance,
+        status=np.array([status_of(*row) for row in zip(error <= tolerance, error, length, strict=True)]),
+        clearance=None,
+    )
+
+
+def status_of(converged: bool, error: float, manoeuvres: int) -> str:
+    """How a search for words ended, in words."""
+    if converged:
+        return "converged"
+    return (
+        f"not found: the closest plan, of {manoeuvres} manoeuvres, leaves {np.rad2deg(error):.6g} deg, which proves "
+        "nothing; more manoeuvres, wider limits or `free_path` may reach it"
     )
 
 
 def first_of(many: Plan) -> Plan:
     """Return the one plan of many."""
-    one: dict[str, Any] = {name: field[0] for name, field in many._asdict().items()}
-    one["word"] = tuple(map(str, one["word"]))
+    one: dict[str, Any] = {name: None if field is None else field[0] for name, field in many._asdict().items()}
+    one["word"], one["status"] = tuple(map(str, one["word"])), str(one["status"])
     return Plan(**one)
 
 

@@ -67,7 +67,7 @@ def test_the_command_line(capsys, monkeypatch, tmp_path):
     options = ["--corners", "5", "--out", str(picture), "--csv", str(table)]
     assert main(["plan", "--vocabulary", "free", "--target", "rotvec 0 0 2", *options]) == 0
     out = capsys.readouterr().out
-    assert out.startswith("Closed path for rotvec 0 0 2 on prototype\n")
+    assert out.startswith("Path for rotvec 0 0 2 on prototype\n")
     assert "reached, to" in out
     assert picture.read_text().lstrip().startswith("<?xml")
     corners = np.loadtxt(table, delimiter=",", skiprows=1)

@@ -1,0 +1,31 @@
+"""The robot of a command: by name, or from a file."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from reojax.robot import Robot
+
+_ENDINGS = (".urdf", ".xml", ".mjcf", ".json")
+
+
+def add_robot(parser: argparse.ArgumentParser, default: str | None = "prototype") -> None:
+    """Declare `--robot`."""
+    text = "robot: a name (a wrong one lists them), or a .urdf, .xml or .json file"
+    parser.add_argument("--robot", default=default, metavar="NAME|FILE", help=f"{text} [%(default)s]")
+
+
+def robot_of(name: str) -> "Robot":
+    """The robot of that name, or in that file.
+
+    Raises:
+        ValueError: if there is no such robot, or the file cannot be read.
+    """
+    from reojax import robots
+
+    if name.lower().endswith(_ENDINGS) or "/" in name or Path(name).is_file():
+        from reojax.models.load import load_robot
+
+        return load_robot(name)
+    return robots.by_name(name)
