@@ -16,15 +16,15 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._internal.arrays import Array
+from reojax._internal.arrays import Array, is_concrete
+from reojax._internal.entries import Entries
+from reojax._internal.replacements import replacement
 from reojax._internal.robot_checks import check_robot
+from reojax._internal.robot_table import one_line, table
 from reojax.capsules import Capsule
 from reojax.manoeuvres import Layout
 
 Side = Literal["parent", "child"]
-
-_FREE = ("collision_pairs", "couplings", "layout", "notes")
-"""Static fields that `replace` may change in length."""
 
 
 def _static() -> Any:
@@ -106,34 +106,54 @@ class Robot:
             )
         )
 
+    def __post_init__(self) -> None:
+        for field, value in vars(self).items():
+            if type(value) is np.ndarray:
+                object.__setattr__(self, field, value.view(Entries))
+
+    def __eq__(self, other: object) -> bool:
+        """Equal where structure, names and all bits of all numbers are."""
+        if not isinstance(other, Robot):
+            return NotImplemented
+        if self is other:
+            return True
+        mine, its = jax.tree.flatten(self), jax.tree.flatten(other)
+        if mine[1] != its[1] or not is_concrete((mine[0], its[0])):
+            return False
+        return all(_bits(x) == _bits(y) for x, y in zip(mine[0], its[0], strict=True))
+
+    def __hash__(self) -> int:
+        """Of what never changes under tracing, and of the masses' bits."""
+        masses = _bits(self.mass) if is_concrete(self.mass) and hasattr(self.mass, "dtype") else id(self.mass)
+        return hash((self.name, self.parent, self.joint_names, masses))
+
     def replace(self, **fields: Any) -> "Robot":
         """Return a copy with some fields changed.
 
-        Takes traced values, so that it can sit inside `vmap` and `grad`; only names and shapes are
-        checked. Static fields (`parent`, `rotor_on`, names, `capsule_link`) keep their lengths.
+        Takes traced values, so that it can sit inside `vmap` and `grad`; only names, shapes and kinds are checked
+        (of numbers on the host also that none is NaN and no mass or rotor inertia negative), not what `make_robot`
+        checks beyond. Static fields (`parent`, `rotor_on`, names, `capsule_link`) keep their lengths.
 
         Raises:
-            ValueError: for a field that a robot does not have, or a wrong shape.
+            ValueError: for a field that a robot does not have, or a wrong shape or kind.
         """
         known = {field.name for field in dataclasses.fields(self)}
         for key, value in fields.items():
             if key not in known:
                 raise ValueError(f"a robot has no field {key!r}; its fields are {', '.join(sorted(known))}.")
-            old = getattr(self, key)
-            if isinstance(old, str) or key in _FREE:
-                continue
-            if isinstance(old, tuple):
-                fields[key] = tuple(value)
-                shape, expected = (len(fields[key]),), (len(old),)
-            else:
-                fields[key] = value if hasattr(value, "shape") else np.asarray(value, float)
-                shape, expected = fields[key].shape, old.shape
-            if shape != expected:
-                raise ValueError(f"`{key}` has shape {shape}; on this robot it must be {expected}.")
+            fields[key] = replacement(self, key, value)
         return dataclasses.replace(self, **fields)
 
     def __repr__(self) -> str:
-        return f"Robot({self.name!r}, {self.links} links, joints {', '.join(self.joint_names)})"
+        return one_line(self)
+
+    def __str__(self) -> str:
+        return table(self)
+
+
+def _bits(array: Any) -> tuple[Any, ...]:
+    host = np.asarray(array)
+    return host.dtype, host.shape, host.tobytes()
 
 
 def make_robot(

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from reojax._internal.arrays import is_concrete
 from reojax._internal.capsule_checks import check_capsules, check_pairs, default_pairs
 from reojax._internal.checks import index_of, numbers, refuse, shorten
 from reojax._internal.definiteness import check_energy
@@ -102,6 +103,12 @@ def _ask_for_degrees(lower: np.ndarray, upper: np.ndarray, names: Sequence[str])
 
 def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str, Any]:
     """Check the arguments of `make_robot`; return the fields of `Robot`, defaults filled in."""
+    for entry, value in {"mass": mass, "axis": axis, **entries}.items():
+        if not is_concrete(value):
+            raise ValueError(
+                f"`{entry}` is traced; make_robot checks numbers, so it runs outside of jit, vmap and grad. Inside, "
+                f"change a robot that is there: robot.replace({entry}=...), robots.with_gear_ratio and its kin."
+            )
     mass = numbers("mass", mass, (-1,))
     links, joints = len(mass), len(mass) - 1
     if not links:
