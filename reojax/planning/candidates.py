@@ -14,6 +14,7 @@ from reojax.planning.residual import Word
 from reojax.planning.table import Table, fold_rotation, tabulate, true_rotations
 from reojax.planning.words import AmplitudeBox, last_twist
 from reojax.robot import Robot
+from reojax.session import usable_cores
 
 _ROWS = 256
 """Rows per call."""
@@ -161,9 +162,10 @@ def _on_table(context: Context, targets: np.ndarray, rows: Candidates, program: 
     def run(chunk: tuple[Word, np.ndarray, int, slice]) -> list[np.ndarray]:
         word, x, size, _ = chunk
         costs = price(context.box, np.asarray(word.letter), np.asarray(word.runs))
-        return [np.asarray(field)[..., :size] for field in program(word, x, costs)]
+        with jax.enable_x64(True):  # a thread of its own starts with JAX's default
+            return [np.asarray(field)[..., :size] for field in program(word, x, costs)]
 
-    with ThreadPoolExecutor(2) as pool:
+    with ThreadPoolExecutor(usable_cores()) as pool:
         results = list(pool.map(run, _chunks(context, targets, rows)))
     return Iterate(*(np.concatenate(field, axis=-1) for field in zip(*results, strict=True)))
 

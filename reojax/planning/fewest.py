@@ -24,12 +24,12 @@ from reojax.planning.candidates import (
 from reojax.planning.initial_guesses import FIRST, Starts
 from reojax.planning.repeated_loops import group_rows, loops
 
-LONGEST = 5
+LONGEST = 6
 """Longest word whose loops each have amplitudes of their own; longer words repeat loops."""
 _ROUNDS = ((0, FIRST), (FIRST, 10), (10, 40))
 """Starts tried for each target, from and to; each round where those before failed."""
 _LAST_ROUND = (40, 240)
-"""Further starts for what is not reached with the longest word that is allowed."""
+"""Further starts for what is not reached with the longest word that is allowed, however far off the others ended."""
 _HOPE = 0.1
 """Squared residual [rad^2] that some start must come down to for another round."""
 _FAR = {1: 0.06, 2: 0.1, 3: 0.15}
@@ -67,7 +67,7 @@ class Answer:
         """(m,) whether the word reaches the target, on the true rotations."""
         return self.rows.square <= self.tolerance**2
 
-    def offer(self, rows: Candidates) -> None:
+    def update_best(self, rows: Candidates) -> None:
         """Take rows, one for each of some targets, that are better than what is there."""
         cost = travel(self._box, rows)
         now = self.rows.square[rows.owner]
@@ -90,24 +90,30 @@ def fewest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -> 
     longest = min(most, LONGEST)
     for slots in range(1, longest + 1):
         _with_loops(scene, targets, answer, slots, _ROUNDS)
-    if longest == LONGEST:
-        _with_loops(scene, targets, answer, longest, (_LAST_ROUND,))
     if most > LONGEST:
         _with_small_loops(scene, targets, most, answer, loops)
-    _as_near_as_possible(scene, targets, answer, longest)
+    _with_loops(scene, targets, answer, longest, (*_ROUNDS, _LAST_ROUND), whatever=True)
     return answer
 
 
 def _with_loops(
-    scene: Context, targets: np.ndarray, answer: Answer, slots: int, rounds: Sequence[tuple[int, int]]
+    scene: Context,
+    targets: np.ndarray,
+    answer: Answer,
+    slots: int,
+    rounds: Sequence[tuple[int, int]],
+    whatever: bool = False,
 ) -> None:
-    """Try words of `slots` loops for what is not reached yet."""
+    """Try words of `slots` loops for what is not reached yet; with `whatever` also where there is little hope."""
     waiting = np.flatnonzero(~answer.solved)
-    waiting = waiting[scene.pool.reaches(targets[:, waiting], slots, _FAR.get(slots, _FAR_LONG))]
+    if not whatever:
+        waiting = waiting[scene.pool.reaches(targets[:, waiting], slots, _FAR.get(slots, _FAR_LONG))]
     closest = np.zeros(len(waiting))
     close = _CLOSE_FEW.get(slots, _CLOSE)
     for first, last in rounds:
-        trying = np.flatnonzero(~answer.solved[waiting] & (closest < _HOPE))
+        trying = np.flatnonzero(~answer.solved[waiting] & (whatever | (closest < _HOPE)))
+        if not len(trying):
+            break
         starts = scene.pool.near(targets[:, waiting[trying]], slots, last)
         some = Starts(*(field[..., first:last] for field in starts))
         found = attempt(scene, targets, starting_rows(waiting[trying], some))
@@ -115,16 +121,8 @@ def _with_loops(
             found = _continue_search(scene, targets, found)
         closest[trying] = found.square.reshape(-1, last - first).min(1)
         missed = found.take(found.square >= close)
-        answer.offer(least(missed, missed.square))
+        answer.update_best(least(missed, missed.square))
         _update_from_solutions(scene, targets, answer, found.take(found.square < close), keep=1)
-
-
-def _as_near_as_possible(scene: Context, targets: np.ndarray, answer: Answer, slots: int) -> None:
-    """Bring words of `slots` loops near the targets that are not reached, however far away they are."""
-    waiting = np.flatnonzero(~answer.solved)
-    starts = scene.pool.near(targets[:, waiting], slots, FIRST)
-    found = attempt(scene, targets, starting_rows(waiting, starts))
-    answer.offer(least(found, found.square))
 
 
 def _continue_search(scene: Context, targets: np.ndarray, found: Candidates) -> Candidates:
@@ -147,7 +145,7 @@ def cheapest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -
         value = travel(scene.box, rows) + 20 * starts.distance.ravel()
         found = attempt(scene, targets, least(rows, value, _LEAST_TRAVEL))
         missed = found.take(found.square >= _CLOSE)
-        answer.offer(least(missed, missed.square))
+        answer.update_best(least(missed, missed.square))
         _update_from_solutions(scene, targets, answer, found.take(found.square < _CLOSE), keep=4)
     if most > LONGEST:
         _with_small_loops(scene, targets, most, answer, lambda rows: travel(scene.box, rows))
@@ -160,24 +158,24 @@ def _with_small_loops(
     """Try words of many equal loops where nothing else reached the target; of the solved ones the least `value`."""
     found = attempt(scene, targets, group_rows(scene, targets, np.flatnonzero(~answer.solved), most))
     missed = found.take(found.square >= _CLOSE)
-    answer.offer(least(missed, missed.square))
+    answer.update_best(least(missed, missed.square))
     found = found.take(found.square < _CLOSE)
     best = least(found, value(found) + np.where(found.square > _EXACT, 1e6, 0.0), _AGAIN)
     short = settle(scene, targets, shorten_candidates(scene, targets, best), answer.tolerance)
     plain = settle(scene, targets, best, answer.tolerance)
     for rows in (short, plain):
         off = np.where(rows.square <= answer.tolerance**2, 0.0, 1e9)
-        answer.offer(least(rows, off + 1e3 * value(rows) + travel(scene.box, rows)))
+        answer.update_best(least(rows, off + 1e3 * value(rows) + travel(scene.box, rows)))
 
 
 def _update_from_solutions(scene: Context, targets: np.ndarray, answer: Answer, found: Candidates, keep: int) -> None:
     """Shorten what reaches the target on the table, and solve it on the true rotations."""
     value = travel(scene.box, found) + np.where(found.square > _EXACT, 1e3, 0.0)
     short = shorten_candidates(scene, targets, least(found, value, keep))
-    answer.offer(settle(scene, targets, least(short, travel(scene.box, short)), answer.tolerance))
+    answer.update_best(settle(scene, targets, least(short, travel(scene.box, short)), answer.tolerance))
     lost = ~answer.solved[found.owner]  # at the edge of what can be reached, where the table is not enough
     again = settle(scene, targets, least(found.take(lost), found.square[lost], _AGAIN), answer.tolerance)
-    answer.offer(least(again, again.square))
+    answer.update_best(least(again, again.square))
 
 
 def rotation_from_folded(scene: Context, targets: np.ndarray) -> np.ndarray:

@@ -18,6 +18,9 @@ _ROUNDING = 1e-9
 _COUPLED = 1e-6
 """How far a posture given may be from its couplings [rad]; it is then put on them exactly."""
 
+_WIDEST = 2 * np.pi
+"""How far a joint goes from its postures at most [rad], where its limits would allow more: what the steps resolve."""
+
 
 class Freedom(NamedTuple):
     """The independent joints that move, k of them, and what the others do meanwhile."""
@@ -55,7 +58,9 @@ def freedom_of(
     lower: ArrayLike | None,
     upper: ArrayLike | None,
 ) -> Freedom:
-    """Read postures, joints and limits; where a joint has no limit, it stays within a half turn of its postures.
+    """Read postures, joints and limits.
+
+    A joint without a limit stays within a half turn of its postures, one of very wide limits within a turn.
 
     Raises:
         ValueError: naming the joint that is outside of its limits, contradicts its coupling, or would have to stay and
@@ -81,8 +86,8 @@ def freedom_of(
     reach = [_own_range(robot, joint, coupled, low, high) for joint in moving]
     box = np.array(reach).reshape(-1, 2).T
     ends = np.stack([first, last])[:, list(moving)]
-    box[0] = np.where(np.isfinite(box[0]), box[0], ends.min(0) - np.pi)
-    box[1] = np.where(np.isfinite(box[1]), box[1], ends.max(0) + np.pi)
+    half = np.where(np.isfinite(box[1] - box[0]), _WIDEST, np.pi)
+    box = np.clip(box, ends.min(0) - half, ends.max(0) + half)
     return Freedom(moving, moves, first, last, np.minimum(box[0], ends.min(0)), np.maximum(box[1], ends.max(0)))
 
 

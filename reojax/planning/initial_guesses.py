@@ -53,6 +53,7 @@ class GuessTable:
         turns = x[::2] * x[1:2] < 0  # which way round, by each distal joint
         self._kind = 2 * letter + turns[0] if len(turns) == 1 else 2 * turns[0] + turns[1]
         self._q = np.asarray(_read(table, letter, x)[0])
+        self.letters, self.amplitudes, self.rotations = letter, x, self._q
         self._words = {}
 
     def reaches(self, target: Float[np.ndarray, "4 m"], slots: int, within: float) -> Bool[np.ndarray, " m"]:

@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from typing import Any
 
 import jax
+import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.manoeuvres import Layout
+from reojax.mechanics.controllable import controllable_directions
 from reojax.planning import quaternions
 from reojax.planning.candidates import Context, context, join
 from reojax.planning.checks import OBJECTIVES, key_of, robot_and_layout
 from reojax.planning.fewest import cheapest, fewest, rotation_from_folded
+from reojax.planning.reach import Reach
 from reojax.planning.result import Plan, first_of, plans
-from reojax.planning.words import VOCABULARIES, box_of
+from reojax.planning.store import Store
+from reojax.planning.words import VOCABULARIES, box_of, fold_angles
 from reojax.robot import Robot
 
 _BATCH = 4096
 """Targets solved together, between two reports of progress."""
 _KEPT = 8
 """Robots and limits whose tables are kept."""
-_scenes: OrderedDict[Any, Context] = OrderedDict()
+_WIDEST = 4 * np.pi
+"""Largest limit of a joint [rad]. What loops beyond two turns do is not worth the table, and no motor's cables bear it;
+a larger number is mostly one of degrees."""
+_scenes: Store[Context] = Store(_KEPT)
 
 
 def plan(
@@ -50,12 +56,12 @@ def plan(
         objective: "count" for the fewest manoeuvres, and of those little travel; "travel" for the least
             joint travel that is found with up to `max_manoeuvres` (at most 5).
         vocabulary: "manoeuvres" for A and B; "rectangles" for loops whose distal joints have amplitudes of their own.
-        layout: which joints twist, bend and fold; default by the robot's number of joints.
+        layout: which joints twist, bend and fold; default the robot's own.
         tolerance: angle to the target that counts as reached [rad].
 
     Returns:
-        The plan. If the target is not reached, the closest plan found, with `converged` False. The identity gives
-        the plan without manoeuvres.
+        The plan. If the target is not reached, the closest plan found, with `converged` False and the reason in
+        `status`. The identity gives the plan without manoeuvres. Computed in float64, whatever JAX's default.
 
     Raises:
         ValueError: naming the entry, if the target is no rotation or an option makes no sense.
@@ -85,49 +91,96 @@ def plan_many(
     """
     layout = robot_and_layout(robot, layout)
     targets = checks.rotations("targets", targets, (-1, 3, 3))
-    twist_limit, bend_limit = checks.positive("twist_limit", twist_limit), checks.positive("bend_limit", bend_limit)
+    twist_limit, bend_limit = _limit("twist_limit", twist_limit), _limit("bend_limit", bend_limit)
     most = checks.whole("max_manoeuvres", max_manoeuvres)
     tolerance = checks.positive("tolerance", tolerance)
     search = {"count": fewest, "travel": cheapest}[checks.one_of("objective", objective, OBJECTIVES)]
     letters = VOCABULARIES[checks.one_of("vocabulary", vocabulary, tuple(VOCABULARIES))]
-    here = _scene(robot, layout, letters, twist_limit, bend_limit)
-    wanted = quaternions.from_matrices(targets)
-    seen = rotation_from_folded(here, wanted)
-    parts = []
-    with _bar(wanted.shape[1], progress) as bar:
-        for first in range(0, wanted.shape[1], _BATCH):
-            batch = seen[:, first : first + _BATCH]
-            parts.append(search(here, batch, most, tolerance).rows)
-            bar.update(batch.shape[1])
-    return plans(here, join(parts), wanted, tolerance)
+    with jax.enable_x64(True):
+        robot = jax.tree.map(lambda leaf: np.asarray(leaf, float), robot)
+        here = _scene(robot, layout, letters, twist_limit, bend_limit)
+        wanted = quaternions.from_matrices(targets)
+        seen = rotation_from_folded(here, wanted)
+        parts = []
+        with _bar(wanted.shape[1], progress) as bar:
+            for first in range(0, wanted.shape[1], _BATCH):
+                batch = seen[:, first : first + _BATCH]
+                parts.append(search(here, batch, most, tolerance).rows)
+                bar.update(batch.shape[1])
+        found = plans(here, join(parts), wanted, tolerance)
+        return found if found.converged.all() else _explain(here, found, seen, tolerance)
 
 
-def replan(robot: Robot, target: ArrayLike, measured: ArrayLike, **options: Any) -> Plan:
+def _limit(entry: str, value: float) -> float:
+    limit = checks.positive(entry, value)
+    if limit > _WIDEST:
+        raise ValueError(f"`{entry}` is {limit:g} rad, more than two turns; is it in degrees?")
+    return limit
+
+
+def _explain(scene: Context, found: Plan, seen: np.ndarray, tolerance: float) -> Plan:
+    """Say which targets no loop of these joints reaches, as seen between the folded ends."""
+    layout = scene.layout
+    moving = (*layout.twist, layout.bend)
+    axes = controllable_directions(scene.robot, fold_angles(layout), joints=moving)
+    reach = Reach(axes.rank, axes.axes, np.eye(3))
+    closest = quaternions.from_matrices(reach.closest(quaternions.to_matrices(seen)))
+    beyond = quaternions.angles(quaternions.product(quaternions.inverse(closest), seen))
+    status = np.array(found.status, object)
+    for row in np.flatnonzero(~found.converged & (beyond > tolerance)):
+        status[row] = f"unreachable: {reach.explain()}; {np.rad2deg(beyond[row]):.6g} deg are left at the least"
+    return found._replace(status=status.astype(str))
+
+
+def replan(
+    robot: Robot,
+    target: ArrayLike,
+    measured: ArrayLike,
+    *,
+    twist_limit: float,
+    bend_limit: float,
+    max_manoeuvres: int,
+    objective: str = "count",
+    vocabulary: str = "manoeuvres",
+    layout: Layout | None = None,
+    tolerance: float = 1e-9,
+) -> Plan:
     """Plan from a measured orientation: feedback between manoeuvres (thesis 1.9).
 
     Args:
         robot: the robot, joints at zero.
         target: (3, 3) orientation to end in, base components to inertial ones.
         measured: (3, 3) orientation now, likewise.
-        **options: as for `plan`.
+        twist_limit: this and all others as for `plan`.
+        bend_limit: as for `plan`.
+        max_manoeuvres: as for `plan`.
+        objective: as for `plan`.
+        vocabulary: as for `plan`.
+        layout: as for `plan`.
+        tolerance: as for `plan`.
 
     Returns:
         The plan for the rotation left, `measured^T target`; its rotation and error are those of that rotation.
     """
     wanted = checks.rotations("target", target, (3, 3))
     now = checks.rotations("measured", measured, (3, 3))
-    return plan(robot, now.T @ wanted, **options)
+    return plan(
+        robot,
+        now.T @ wanted,
+        twist_limit=twist_limit,
+        bend_limit=bend_limit,
+        max_manoeuvres=max_manoeuvres,
+        objective=objective,
+        vocabulary=vocabulary,
+        layout=layout,
+        tolerance=tolerance,
+    )
 
 
 def _scene(robot: Robot, layout: Layout, letters: str, twist_limit: float, bend_limit: float) -> Context:
     """Compute what plans of one robot within one box share, or find it among the last few."""
-    key = (key_of(robot), layout, letters, twist_limit, bend_limit, jax.dtypes.canonicalize_dtype(float))
-    if key not in _scenes:
-        _scenes[key] = context(robot, layout, box_of(robot, layout, letters, twist_limit, bend_limit))
-        if len(_scenes) > _KEPT:
-            _scenes.popitem(last=False)
-    _scenes.move_to_end(key)
-    return _scenes[key]
+    key = key_of(robot), layout, letters, twist_limit, bend_limit
+    return _scenes.get(key, lambda: context(robot, layout, box_of(robot, layout, letters, twist_limit, bend_limit)))
 
 
 def _bar(total: int, show: bool) -> Any:

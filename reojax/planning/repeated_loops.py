@@ -1,13 +1,15 @@
 """Small loops, many times over: words like A^30 B^12 A^25, for limits that one loop at a time does not satisfy.
 
-At the limits a loop turns the base by a fixed rotation, and how many of each a target takes follows from splitting
-it into turns about the loops' axes (an Euler split about axes that are not quite perpendicular), with real numbers
-of loops and as few as possible. Then the numbers are made whole, up or down, and the amplitudes solved for.
+A loop of given amplitudes turns the base by a fixed rotation, and how many of each a target takes follows from
+splitting it into turns about the loops' axes (an Euler split about axes that are not quite perpendicular), with real
+numbers of loops and as few as possible. Then the numbers are made whole, up or down, and the amplitudes solved for. The
+loops are A and B at the limits, and those which turn most about the principal axes of what all loops within the limits
+do: of some robots A and B at the limits turn about nearly the same axis, and only others turn them across it.
 """
 
 from __future__ import annotations
 
-from itertools import product as every
+from itertools import permutations, product as every
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +20,13 @@ from reojax.planning.candidates import Candidates, Context
 from reojax.planning.table import true_rotations
 from reojax.planning.words import last_twist
 
-_PATTERNS = ((0, 1, 0), (1, 0, 1), (0, 1, 0, 1), (1, 0, 1, 0), (0, 1, 0, 1, 0), (1, 0, 1, 0, 1))
-"""Groups of loops: 0 for A, 1 for B."""
+_PATTERNS = (
+    *((0, 1, 0), (1, 0, 1), (0, 1, 0, 1), (1, 0, 1, 0), (0, 1, 0, 1, 0), (1, 0, 1, 0, 1)),
+    *permutations((2, 3, 4)),
+    *((a, b, a) for a, b in permutations((2, 3, 4), 2)),
+    *((a, b, a, b) for a, b in ((2, 3), (3, 2), (2, 4), (3, 4))),
+)
+"""Groups of loops: 0 for A and 1 for B at the limits, 2 to 4 for the loops along the principal axes."""
 _SLOTS = 6
 _STARTS = 12
 """Splits tried for each pattern and target."""
@@ -27,20 +34,23 @@ _KEPT = 3
 """Splits of each target and pattern that are made whole, from the fewest loops to the most: few loops may leave no
 room to make the numbers whole."""
 
+_CLOSEST = 6
+"""Splits of each target that are made whole where none reaches it."""
+
 
 class Units(NamedTuple):
-    """One loop at the limits, for A and B and for both ways (positive first)."""
+    """One loop of each kind, for both ways (positive first)."""
 
-    letter: Int[np.ndarray, "2 2"]
+    letter: Int[np.ndarray, "5 2"]
     """Letters."""
-    x: Float[np.ndarray, "d 2 2"]
+    x: Float[np.ndarray, "d 5 2"]
     """Amplitudes [rad]."""
-    turn: Float[np.ndarray, "3 2 2"]
+    turn: Float[np.ndarray, "3 5 2"]
     """Half the rotation vector [rad]."""
 
 
 def units(scene: Context) -> Units:
-    """Loops at the limits."""
+    """Loops at the limits, and along the principal axes of all loops."""
     box = scene.box
     free = box.low.shape[1] == 3
     letter = np.zeros((2, 2), int) if free else np.array([[0, 0], [1, 1]])
@@ -51,17 +61,33 @@ def units(scene: Context) -> Units:
         if free:
             end = -x[0, kind, way] if kind == 0 else x[0, kind, way]
             x[2, kind, way] = np.clip(end, low[2], high[2])
+    chosen = _along_principal_axes(_half_vectors(scene.pool.rotations))
+    letter = np.concatenate([letter, scene.pool.letters[chosen]])
+    x = np.concatenate([x, scene.pool.amplitudes[:, chosen]], axis=1)
     amplitudes = np.stack([x[0], x[1], last_twist(box.letters, letter, x)]).reshape(3, -1)
-    q = true_rotations(scene.robot, scene.layout, amplitudes)
+    turn = _half_vectors(true_rotations(scene.robot, scene.layout, amplitudes))
+    return Units(letter, x, turn.reshape(3, *letter.shape))
+
+
+def _half_vectors(q: Float[np.ndarray, "4 m"]) -> Float[np.ndarray, "3 m"]:
+    """Half the rotation vectors of quaternions, the short way round."""
+    q = np.where(q[0] < 0, -q, q)
     sine = np.sqrt((q[1:] ** 2).sum(0))
-    turn = np.arctan2(sine, q[0]) / np.where(sine > 0, sine, 1.0) * q[1:]
-    return Units(letter, x, turn.reshape(3, 2, 2))
+    return np.arctan2(sine, q[0]) / np.where(sine > 0, sine, 1.0) * q[1:]
+
+
+def _along_principal_axes(vectors: Float[np.ndarray, "3 m"]) -> Int[np.ndarray, "3 2"]:
+    """For both ways along each principal axis of some vectors the one that goes far along it and little across it."""
+    axes = np.linalg.eigh(vectors @ vectors.T)[1]
+    along = axes.T @ vectors
+    worth = along * np.abs(along) / np.maximum(np.sqrt((vectors**2).sum(0)), np.finfo(float).tiny)
+    return np.stack([worth.argmax(1), worth.argmin(1)], axis=1)[::-1]
 
 
 def group_rows(scene: Context, targets: np.ndarray, owner: np.ndarray, most: int) -> Candidates:
     """Rows to start from, for the targets `owner`: all ways to make the best splits whole with up to `most` loops."""
     one = units(scene)
-    kind, numbers, who = _splits(one, targets[:, owner])
+    kind, numbers, who = _splits(one, targets[:, owner], most)
     rows = []
     for i in range(len(owner)):
         for pattern in np.unique(kind[:, who == i], axis=1).T:
@@ -102,7 +128,7 @@ def _whole(one: Units, kind: np.ndarray, numbers: np.ndarray, most: int, owner: 
     return rows
 
 
-def _splits(one: Units, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _splits(one: Units, targets: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Solve for real numbers of loops: kinds (6, s), numbers (6, s) and the target's number (s,) of each split."""
     rng = np.random.default_rng(0)
     m = targets.shape[1]
@@ -129,6 +155,12 @@ def _splits(one: Units, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
         force = np.linalg.solve(matrix, back[..., None])[..., 0]
         n = n + scale * np.clip(downhill - np.einsum("iks,si->ks", weighted, force), -0.5, 0.5)
     done = np.isfinite(least)
+    none = ~np.bincount(who[done], minlength=m).astype(bool)
+    if none.any():  # where nothing reaches the target, what comes closest with as many loops as are allowed
+        n = n * np.minimum(1.0, most / np.maximum(np.abs(n).sum(0), 1e-9))
+        away = (_miss(one, kind, n, target)[0] ** 2).sum(0).reshape(m, -1)
+        near = np.argsort(away, axis=1)[none, :_CLOSEST] + np.flatnonzero(none)[:, None] * away.shape[1]
+        best[:, near.ravel()], done[near.ravel()] = n[:, near.ravel()], True
     return kind[:, done], best[:, done], who[done]
 
 

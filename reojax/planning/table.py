@@ -26,6 +26,7 @@ from reojax.path import polygon
 from reojax.planning import quaternions
 from reojax.planning.words import AmplitudeBox, fold_angles, last_twist, loop_corners
 from reojax.robot import Robot
+from reojax.session import usable_cores
 
 _CHUNK = 128
 """Loops per call: one program for any number of them."""
@@ -50,7 +51,7 @@ def true_rotations(robot: Robot, layout: Layout, amplitudes: Float[np.ndarray, "
     def rotations(chunk: np.ndarray) -> np.ndarray:
         return np.asarray(_net_rotations(without_names(robot), chunk, steps, pattern))
 
-    with ThreadPoolExecutor(2) as pool:
+    with ThreadPoolExecutor(usable_cores()) as pool:
         turned = list(pool.map(rotations, corners.reshape(-1, _CHUNK, *corners.shape[1:])))
     return quaternions.from_matrices(np.concatenate([np.zeros((0, 3, 3)), *turned])[:count])
 

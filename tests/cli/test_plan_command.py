@@ -88,12 +88,29 @@ def test_a_bad_target_is_one_line_and_status_2(capsys, monkeypatch, tmp_path, ta
         ("--max-manoeuvres", "0", "`max_manoeuvres` is 0; it must be a positive integer"),
         ("--out", "a.bmp", "cannot write 'a.bmp'"),
         ("--csv", "a.txt", "cannot write 'a.txt'"),
-        ("--robot", "planar3", "'planar3' has no layout of its own"),
+        ("--robot", "missing.urdf", "missing.urdf"),
+        ("--from", "0,1", "argument --from: '0,1' has 2 angles; 'prototype' has 3 joints: twist1, bend, twist2"),
+        ("--from", "elbow=3", "argument --from: 'elbow=3' must be JOINT=DEGREES; the joints are twist1, bend, twist2"),
+        ("--to", "0,1,x", "argument --to: 'x' is not an angle in degrees"),
+        ("--joints", "elbow", "`joints[0]` is 'elbow'"),
+        ("--repeats", "many", "argument --repeats: 'many' must be a whole number, or `least`"),
+        ("--save", "plan.txt", "cannot write 'plan.txt'"),
+        ("--twist-limit", "17000", "`twist_limit` is 296.706 rad, more than two turns; is it in degrees?"),
     ],
 )
 def test_bad_options(capsys, option, value, message):
     assert main(["plan", "--target", "rotvec 0 0 90", option, value]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_words_need_a_layout_and_free_paths_have_options_of_their_own(capsys):
+    """A layout is never guessed; a target may be written without quotes."""
+    assert (
+        main(["plan", "--robot", "planar3", "--vocabulary", "manoeuvres", "--target", "rotvec", "0", "0", "-90"]) == 2
+    )
+    assert "'planar3' has no layout of its own" in capsys.readouterr().err
+    assert main(["plan", "--vocabulary", "manoeuvres", "--target", "rotvec 0 0 90", "--repeats", "2"]) == 2
+    assert "argument --repeats: it is for free paths, not for manoeuvres" in capsys.readouterr().err
 
 
 def test_small_loops_many_times_over():

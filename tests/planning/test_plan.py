@@ -114,6 +114,8 @@ def test_a_planar_robot_turns_in_its_plane_only():
     plan = reojax.plan(robot, out_of_plane, **LIMITS, max_manoeuvres=2)
     assert not plan.converged
     assert plan.error == pytest.approx(0.5)
+    assert plan.status.startswith("unreachable: loops of the joints that move turn the base about the axis (0, 0, ")
+    assert plan.status.endswith("28.6479 deg are left at the least")
 
 
 def test_less_travel_when_travel_counts():
