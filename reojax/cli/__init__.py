@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
-from reojax.cli import compare, export, merge, plan, simulate, sweep, time, view
+from reojax.cli import compare, export, merge, plan, show, simulate, sweep, time, view
 from reojax.cli._arguments import BadInput, Parser, join_negative_values, version
 
 COMMANDS = {
@@ -25,6 +25,7 @@ COMMANDS = {
     "sweep": sweep,
     "merge": merge,
     "view": view,
+    "show": show,
 }
 """Subcommands by name."""
 

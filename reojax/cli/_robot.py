@@ -24,8 +24,16 @@ def robot_of(name: str) -> "Robot":
     """
     from reojax import robots
 
-    if name.lower().endswith(_ENDINGS) or "/" in name or Path(name).is_file():
-        from reojax.models.load import load_robot
+    if name in robots.NAMES or not is_file(name):
+        return robots.by_name(name)
+    from reojax.models.load import load_robot
 
+    try:
         return load_robot(name)
-    return robots.by_name(name)
+    except ImportError as error:  # it says what to install
+        raise ValueError(str(error)) from None
+
+
+def is_file(name: str) -> bool:
+    """Whether a text is meant as the path of a robot file."""
+    return name.lower().endswith(_ENDINGS) or "/" in name or Path(name).is_file()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from reojax.cli._arguments import BadInput, version
 from reojax.cli._page import add_page, check_page, write_page
 from reojax.cli._planned import add_plan, plan_motion
+from reojax.cli._robot import add_robot, robot_of
 
 if TYPE_CHECKING:
     from reojax.captures.calibration import Calibration
@@ -20,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `reojax compare`."""
     add = parser.add_argument
     add("capture", metavar="CAPTURE.csv", help="time, joint angles and/or orientation of link 1; see docs/captures.md")
-    add("--robot", default="prototype", metavar="NAME", help="robot; a wrong name lists them [%(default)s]")
+    add_robot(parser)
     add_plan(parser, manoeuvre=None)
     add("--angles", choices=("deg", "rad"), help="unit of angles whose header does not say it")
     add("--offset", type=float, metavar="S", help="time of the capture at which the motion starts [fitted]")
@@ -33,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     """Read, compute, write the picture, and print."""
-    from reojax import robots, session
+    from reojax import session
     from reojax.captures.capture import read_capture
 
     session.start()
@@ -41,7 +42,7 @@ def run(args: argparse.Namespace) -> None:
         if args.out is not None:
             _check_picture(args.out)
         check_page(args)
-        robot = robots.by_name(args.robot)
+        robot = robot_of(args.robot)
         capture = read_capture(args.capture, robot, angle_unit=args.angles)
         report, robot, comparison = _report(robot, capture, args)
         if args.out is not None:

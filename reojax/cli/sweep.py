@@ -10,6 +10,7 @@ from reojax._internal.display_units import display_unit
 from reojax.cli._arguments import BadInput, degrees
 from reojax.cli._axes import AXES, axis, check_names
 from reojax.cli._results import add_files, check_files, complaint, table, write
+from reojax.cli._robot import add_robot, robot_of
 
 OUTPUTS = ("roll", "off_axis", "angle", "travel")
 """Results by name; all of them are angles."""
@@ -21,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     units = ((name, display_unit(unit)[0]) for name, (unit, *_) in AXES.items())
     names = ", ".join(f"{name} [{unit}]" if unit else name for name, unit in units)
     add("axes", nargs="+", type=axis, metavar="AXIS", help=f"NAME=START:STOP:COUNT or NAME=VALUE,VALUE,...: {names}")
-    add("--robot", default="prototype", metavar="NAME", help="robot; a wrong name lists them [%(default)s]")
+    add_robot(parser)
     parts = "a: the distal joints twist opposite ways; b: the same way [%(default)s]"
     add("--manoeuvre", choices=("a", "b"), default="a", help=parts)
     add("--twist", type=degrees, default=270.0, metavar="DEG", help="twist, where it is no axis [%(default)g]")
@@ -43,7 +44,7 @@ def run(args: argparse.Namespace) -> None:
     import jax
     import numpy as np
 
-    from reojax import robots, session
+    from reojax import session
     from reojax.cli._turns import turn_function
     from reojax.sweeps.sweep import run_sweep
 
@@ -56,7 +57,7 @@ def run(args: argparse.Namespace) -> None:
         axes = {axis.name: axis.values() for axis in args.axes}
         fixed = {"twist": np.deg2rad([args.twist]), "bend": np.deg2rad([args.bend])}
         amplitudes = {name: axes.get(name, value) for name, value in fixed.items()}
-        function = turn_function(robots.by_name(args.robot), args.manoeuvre, args.outputs, amplitudes)
+        function = turn_function(robot_of(args.robot), args.manoeuvre, args.outputs, amplitudes)
         units = {name: AXES[name].unit for name in axes if AXES[name].unit} | dict.fromkeys(args.outputs, "rad")
         options = (args.chunk_size, args.store, args.devices, not args.quiet, units, args.shard)
         found = run_sweep(function, axes, *options)

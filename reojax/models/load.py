@@ -82,6 +82,20 @@ def load_robot(
     return robot
 
 
+def joint_kinds(path: str | os.PathLike[str], base: str | None = None) -> dict[str, str]:
+    """Kind of each joint of a URDF or MJCF, as the file has it: "revolute", "prismatic" and so on.
+
+    Raises:
+        ValueError: naming the file and what is wrong with it.
+        ImportError: naming what to install.
+    """
+    try:
+        description = _describe(path, read_bytes(path, LARGEST), base)
+    except ValueError as error:
+        raise ValueError(f"cannot load {shorten(os.fspath(path))}: {error}.") from None
+    return {name: joint.kind for name, joint in description.joints.items()}
+
+
 def _describe(path: str | os.PathLike[str], data: bytes, base: str | None) -> Description:
     root = parse_xml(data.lstrip())
     if root.tag == "robot":

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from reojax._internal.checks import shorten
 from reojax.robot import Robot
 from reojax.robots.astronaut import astronaut as astronaut
 from reojax.robots.edits import (
@@ -39,5 +40,5 @@ def by_name(name: str) -> Robot:
         ValueError: if `name` is not one of `NAMES`.
     """
     if name not in _BUILDERS:
-        raise ValueError(f"there is no robot named {name!r}; the names are {', '.join(NAMES)}.")
+        raise ValueError(f"there is no robot named {shorten(name)}; the names are {', '.join(NAMES)}.")
     return _BUILDERS[name]()

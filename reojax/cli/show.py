@@ -1,0 +1,190 @@
+"""Tell what a robot or a file holds: links, joints, limits, motors, shapes, what was merged, and a self-check."""
+
+import argparse
+import json
+from typing import TYPE_CHECKING, Any
+
+from reojax.cli._arguments import BadInput, version
+
+if TYPE_CHECKING:
+    from reojax.planning.plan_file import SavedPlan
+    from reojax.robot import Robot
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `reojax show`."""
+    add = parser.add_argument
+    add(
+        "robot",
+        metavar="NAME|FILE",
+        help="robot: a name (a wrong one lists them), or a .urdf, .xml or .json file, also a plan",
+    )
+    add("--base", metavar="LINK", help="link to be the base [the file's root]")
+    add("--lock", action="append", default=[], metavar="JOINT=X", help="hold a joint there [deg, or m]; many times")
+    add("--gear", action="append", default=[], metavar="JOINT=N", help="rotor turns per joint turn; many times")
+    add("--rotor", action="append", default=[], metavar="JOINT=J", help="rotor inertia [kg m^2]; many times")
+    add("--repair", action="store_true", help="change inertias that no body has to the nearest possible ones")
+    add("--no-shapes", action="store_true", help="leave collision shapes out")
+    add("--save", metavar="FILE", help="write the robot as it is shown to a .json, which --robot takes everywhere")
+    add("--json", action="store_true", help="print one JSON object, with all digits")
+
+
+def run(args: argparse.Namespace) -> None:
+    """Load, check, save, and print."""
+    from reojax import session
+
+    session.start()
+    try:
+        plan = _plan(args.robot)
+        robot = _robot(args) if plan is None else plan.robot
+        if args.save is not None:
+            from reojax.models.json_file import save_robot
+
+            save_robot(robot, args.save)
+        report = _report(robot, args) | ({} if plan is None else {"plan": _plan_report(plan)})
+    except ValueError as error:
+        raise BadInput(f"reojax show: {error}") from error
+    print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(robot, report))
+
+
+def _plan(name: str) -> "SavedPlan | None":
+    """The plan that a file holds, if it holds one."""
+    from pathlib import Path
+
+    from reojax._internal.json_files import read_object
+    from reojax.planning.plan_file import FORMAT, load_plan
+
+    if Path(name).suffix.lower() != ".json" or read_object(name).get("format") != FORMAT:
+        return None
+    return load_plan(name)
+
+
+def _plan_report(plan: "SavedPlan") -> dict[str, Any]:
+    import numpy as np
+
+    return {
+        "corners": len(plan.waypoints),
+        "runs": int(plan.repeats),
+        "travel_deg": float(np.rad2deg(plan.travel)),
+        "error_rad": float(plan.error),
+    }
+
+
+def _robot(args: argparse.Namespace) -> "Robot":
+    from reojax.cli._robot import is_file, robot_of
+    from reojax.models.load import load_robot
+
+    changes = bool(args.base or args.lock or args.gear or args.rotor or args.repair or args.no_shapes)
+    if not is_file(args.robot) or not changes:
+        if changes:
+            raise ValueError("--base, --lock, --gear, --rotor, --repair and --no-shapes are for files.")
+        return robot_of(args.robot)
+    try:
+        return load_robot(
+            args.robot,
+            base=args.base,
+            lock=_locked(args),
+            gear_ratio=_numbers("--gear", args.gear),
+            rotor_inertia=_numbers("--rotor", args.rotor),
+            repair=args.repair,
+            shapes=not args.no_shapes,
+        )
+    except ImportError as error:
+        raise ValueError(str(error)) from None
+
+
+def _locked(args: argparse.Namespace) -> dict[str, float]:
+    """Positions in the file's units: degrees become radians where the joint turns."""
+    import math
+
+    from reojax.models.load import joint_kinds
+
+    given = _numbers("--lock", args.lock)
+    kinds = joint_kinds(args.robot, args.base) if given else {}
+    return {name: value if kinds.get(name) == "prismatic" else math.radians(value) for name, value in given.items()}
+
+
+def _numbers(option: str, pairs: list[str]) -> dict[str, float]:
+    found = {}
+    for pair in pairs:
+        name, _, text = pair.rpartition("=")
+        try:
+            found[name] = float(text)
+        except ValueError:
+            name = ""
+        if not name:
+            raise ValueError(f"argument {option}: {pair[:100]!r} must be a joint's name, = and a number.")
+    return found
+
+
+def _report(robot: "Robot", args: argparse.Namespace) -> dict[str, Any]:
+    from reojax.models.json_file import to_json
+
+    return {
+        "command": "show",
+        "version": version(),
+        "config": {"robot": args.robot},
+        "total_mass_kg": float(robot.mass.sum()),
+        "robot": to_json(robot),
+        "self_check": _self_check(robot),
+        "saved": args.save,
+    }
+
+
+def _self_check(robot: "Robot") -> dict[str, Any]:
+    """Momentum at postures within the limits, against an independent sum over the links."""
+    import dataclasses
+
+    import jax
+    import numpy as np
+
+    from reojax._internal.definiteness import energy_matrix
+    from reojax.mechanics.momentum import momentum_matrices
+    from reojax.session import compile_quickly
+
+    compile_quickly()
+    rng = np.random.default_rng(0)
+    fields = {field.name: getattr(robot, field.name) for field in dataclasses.fields(robot)}
+    fields["axis"] = fields["axis"] / np.linalg.norm(fields["axis"], axis=1, keepdims=True)
+    matrices = jax.jit(momentum_matrices)
+    apart, left, least, symmetric = 0.0, 0.0, np.inf, 0.0
+    for _ in range(4):
+        theta = rng.uniform(np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi))
+        A, B = (np.asarray(part) for part in matrices(robot, theta))
+        whole = energy_matrix(fields, theta)
+        size = np.abs(A).max()
+        apart = max(apart, np.abs(A - whole[:3, :3]).max() / size, np.abs(B + whole[:3, 3:]).max(initial=0) / size)
+        turning = np.linalg.solve(A, B)
+        moving = np.vstack([turning, np.eye(robot.joints)])
+        exchanged = np.abs(whole[:3]) @ np.abs(moving)
+        left = max(left, (np.abs(whole[:3] @ moving) / np.maximum(exchanged, 1e-300)).max(initial=0))
+        symmetric = max(symmetric, np.abs(A - A.T).max() / size)
+        scale = 1 / np.sqrt(np.diag(whole))
+        least = min(least, np.linalg.eigvalsh(whole * scale[:, None] * scale)[0])
+    return {
+        "momentum_relative": float(left),
+        "matrices_relative": float(apart),
+        "asymmetry_relative": float(symmetric),
+        "least_energy": float(least),
+        "passed": bool(left < 1e-9 and apart < 1e-9 and symmetric < 1e-9 and least > 0),
+    }
+
+
+def _text(robot: "Robot", report: dict[str, Any]) -> str:
+    check = report["self_check"]
+    lines = [str(robot), "", f"momentum self-check: {'passed' if check['passed'] else 'FAILED'}"]
+    for label, key, meaning in (
+        ("momentum", "momentum_relative", "left at omega = A^-1 B theta', as a share of what the links exchange"),
+        ("A and B", "matrices_relative", "apart from an independent sum over the links"),
+        ("symmetry", "asymmetry_relative", "of A"),
+        ("energy", "least_energy", "least kinetic energy of a motion, scaled; positive means that it can be solved"),
+    ):
+        lines.append(f"  {label:<10}{check[key]:>9.1e}  {meaning}")
+    if "plan" in report:
+        plan = report["plan"]
+        runs = f", run {plan['runs']} times" if plan["runs"] > 1 else ""
+        travel, error = plan["travel_deg"], plan["error_rad"]
+        lines += ["", f"plan: {plan['corners']} corners{runs}, {travel:.1f} deg of joint travel, {error:.1e} rad off"]
+    if report["saved"] is not None:
+        lines += ["", f"robot in {report['saved']}"]
+    return "\n".join(lines)
