@@ -27,11 +27,25 @@ from reojax._internal.linalg import solve_symmetric3
 from reojax.mechanics.integrators import RK4, runge_kutta_step
 from reojax.mechanics.kinematics import kinematics
 from reojax.mechanics.momentum import momentum_matrices
+from reojax.motion._resolution import (
+    MOST,
+    TURN,
+    Resolution,
+    error_by_halving,
+    over_nodes,
+    quietly,
+    refine,
+    spin_bounds,
+    start_count,
+    target_error,
+)
 from reojax.motion.trajectory import Trajectory, polynomial
 from reojax.robot import Robot
 
 DEFAULT_STEPS = 32
-"""Steps of each piece of a trajectory; fourth order."""
+"""Steps of each piece of a trajectory at which a motion is told."""
+_ORDER = 4
+"""Of the integration."""
 
 
 class Release(NamedTuple):
@@ -56,6 +70,8 @@ class Released(NamedTuple):
     """Orientation of the base; the first is the identity."""
     momentum: Float[Array, "m 3"]
     """Angular momentum about the centre of mass, inertial frame [kg m^2/s]."""
+    error: Float[Array, ""]
+    """Estimate of how far any `rotation` may be wrong by the steps taken, not by the robot's numbers [rad]."""
 
 
 class ReleaseSpread(NamedTuple):
@@ -78,7 +94,12 @@ class ReleaseSpread(NamedTuple):
 
 
 def released(
-    robot: Robot, trajectory: Trajectory, release: Release | None = None, *, steps: int = DEFAULT_STEPS
+    robot: Robot,
+    trajectory: Trajectory,
+    release: Release | None = None,
+    *,
+    steps: int = DEFAULT_STEPS,
+    substeps: int | None = None,
 ) -> Released:
     """Orientation and momentum of a robot that does a joint motion after a release.
 
@@ -86,13 +107,45 @@ def released(
         robot: the robot.
         trajectory: its joints' motion, as `along` makes it from a path, a time law and durations.
         release: how it is let go; default perfectly.
-        steps: steps of each piece of the trajectory, static; fourth order.
+        steps: parts of each piece of the trajectory at whose ends the motion is told, static.
+        substeps: integration steps of each part, static; fourth order. Default as many as bring `Released.error` below
+            1e-8 rad (1e-4 in float32), by how far the robot turns, and is braked, in a step; one where numbers are
+            traced.
 
     Raises:
-        ValueError: if anything does not fit the robot, or is not finite.
+        ValueError: if anything does not fit the robot, or is not finite, or if the robot spins, or the wire brakes it,
+            too fast for any number to come out.
+
+    Warns:
+        UserWarning: if the orientation is uncertain by more than 1e-3 rad with all the steps that are taken unasked.
     """
-    release = Release() if release is None else release
-    return _simulate_release(*_check_release(robot, trajectory, release, steps), steps)
+    given = _check_release(robot, trajectory, Release() if release is None else release, steps)
+
+    def run(count: int) -> tuple[Released, Resolution]:
+        return _simulate_release(*given, int(steps), count)
+
+    if substeps is not None:
+        return quietly(run, checks.whole("substeps", substeps))[0]
+    if not is_concrete(given):
+        return run(1)[0]
+    least, most = _turn_bounds(*given)
+    return refine(
+        run,
+        first=start_count(1, 1, most / steps),
+        hopeless=least / steps,
+        steps=trajectory.pieces * int(steps),
+        order=_ORDER,
+        target=target_error(given[2].dtype),
+        what=f"{robot.name!r} after this release",
+    )
+
+
+def _turn_bounds(robot: Robot, trajectory: Trajectory, release: Array) -> tuple[float, float]:
+    """Bounds of the turn by the momentum at the start, and by the wire's braking, in the longest piece [rad]."""
+    longest = float(np.diff(np.asarray(trajectory.breaks, float)).max())
+    numbers = np.asarray(release, float)
+    spin, drag = (spin_bounds(robot, part, longest) for part in (numbers[:3], numbers[9:]))
+    return max(spin[0], drag[0]), spin[1] + drag[1]
 
 
 def release_spread(
@@ -103,7 +156,7 @@ def release_spread(
     *,
     expected: Release | None = None,
     draws: int = 256,
-    steps: int = DEFAULT_STEPS,
+    steps: int | None = None,
 ) -> ReleaseSpread:
     """Net rotation and how far an uncertain release spreads it, by derivatives and by draws.
 
@@ -116,17 +169,33 @@ def release_spread(
         key: a key of `jax.random`, for the draws.
         expected: the release that is aimed at; default a perfect one.
         draws: number of draws, static.
-        steps: steps of each piece of the trajectory, static.
+        steps: steps of each piece of the trajectory, static; fourth order. Default 32, or more where the robot may
+            turn, or be braked, by more than 0.1 rad in one (by three standard deviations).
 
     Raises:
-        ValueError: if anything does not fit the robot, is not finite, or a deviation is negative.
+        ValueError: if anything does not fit the robot, is not finite, or a deviation is negative, or the motion is too
+            fast for the steps.
     """
     checks.whole("draws", draws)
-    robot, trajectory, mean = _check_release(robot, trajectory, Release() if expected is None else expected, steps)
-    *_, spread = _check_release(robot, trajectory, deviation, steps)
+    aim = Release() if expected is None else expected
+    robot, trajectory, mean = _check_release(robot, trajectory, aim, DEFAULT_STEPS if steps is None else steps)
+    *_, spread = _check_release(robot, trajectory, deviation, 1)
     if is_concrete(spread) and (np.asarray(spread) < 0).any():
         raise ValueError(f"`deviation` is {deviation}; standard deviations must not be negative.")
-    return _spread(robot, trajectory, mean, spread, key, int(draws), int(steps))
+    if steps is None:
+        steps = DEFAULT_STEPS
+        if is_concrete((robot, trajectory, mean, spread)):
+            _, turn = _turn_bounds(robot, trajectory, jnp.abs(mean) + 3 * spread)
+            steps *= start_count(1, 1, 2 * turn / DEFAULT_STEPS)
+            if trajectory.pieces * steps > MOST // 4:
+                raise ValueError(
+                    f"after this release {robot.name!r} turns, or is braked, by up to {turn:.3g} rad in a piece of the "
+                    f"trajectory: more than {MOST // 4} steps of {TURN} rad would be taken. Give `steps` to take them."
+                )
+    found = _spread(robot, trajectory, mean, spread, key, int(draws), int(steps))
+    if is_concrete(found) and not all(np.isfinite(leaf).all() for leaf in found):
+        raise ValueError(f"after this release {robot.name!r} turns, or is braked, too fast for {steps} steps a piece.")
+    return found
 
 
 def _check_release(
@@ -165,10 +234,28 @@ class _Node(NamedTuple):
     """(3,) centre of mass of the robot in the base frame [m]."""
 
 
-@partial(jax.jit, static_argnums=3)
-def _simulate_release(robot: Robot, trajectory: Trajectory, release: Array, steps: int) -> Released:
-    time, length, nodes = _nodes(robot, trajectory, steps)
-    return Released(time, *_integrate(length, nodes, release))
+@partial(jax.jit, static_argnums=(3, 4))
+def _simulate_release(
+    robot: Robot, trajectory: Trajectory, release: Array, steps: int, substeps: int
+) -> tuple[Released, Resolution]:
+    if steps * substeps % 2:  # the error is found by half the steps
+        substeps *= 2
+    time, length, nodes = _nodes(robot, trajectory, steps * substeps)
+    count = len(length)
+    double = jax.tree.map(lambda x: _half(jnp.stack([x[::2, 0], x[::2, 2], x[1::2, 2]], axis=1)), nodes)
+    both = jax.tree.map(lambda *pair: jnp.stack(pair), nodes, double)
+    integrate = jax.vmap(_integrate, (0, 0, None))  # one loop, compiled once
+    (fine, coarse), (momentum, _) = integrate(jnp.stack([length, _half(2 * length[::2])]), both, release)
+    error = error_by_halving(fine, coarse[: count // 2 + 1], _ORDER)
+    size, mobility = jnp.sqrt((momentum[:-1] ** 2).sum(-1)), jnp.sqrt((nodes.mobility**2).sum((-1, -2)).max(1))
+    rate = jnp.sqrt((nodes.own**2).sum(-1).max(1)) + mobility * (jnp.where(jnp.isfinite(size), size, 0) + release[9])
+    resolution = Resolution(error, jax.lax.stop_gradient((length * rate).max()))
+    return Released(time[::substeps], fine[::substeps], momentum[::substeps], error), resolution
+
+
+def _half(values: Array) -> Array:
+    """Values of half the steps, filled up with steps of no length."""
+    return jnp.concatenate([values, jnp.zeros_like(values)])
 
 
 @partial(jax.jit, static_argnums=(5, 6))
@@ -216,7 +303,7 @@ def _nodes(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Arr
         both = solve_symmetric3(A, columns)
         return _Node(both[:, 0], both[:, 1:], robot.com[0] - kinematics(robot, theta).com[0])
 
-    nodes = jax.vmap(node)(*(leaf.reshape(within.size, robot.joints) for leaf in (state.theta, state.theta_dot)))
+    nodes = over_nodes(node, *(leaf.reshape(within.size, robot.joints) for leaf in (state.theta, state.theta_dot)))
     count = trajectory.pieces * steps
     length = jnp.repeat(piece / steps, steps)
     time = jnp.append((trajectory.breaks[:-1, None] + within[:, :, 0]).ravel(), trajectory.breaks[-1])

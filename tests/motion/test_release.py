@@ -4,10 +4,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 import reojax
 from reojax import Release, release_spread, released, robots, so3
 from reojax.mechanics.kinematics import kinematics
+from reojax.motion import _resolution
 
 ROBOT = robots.prototype()
 PATH = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
@@ -74,7 +77,8 @@ def test_spread_by_derivatives_and_by_draws():
     deviation = Release((2e-6, 2e-6, 2e-6), (2e-4, 2e-4, 2e-4), (1e-3, 1e-3, 1e-3), 1e-7)
     wire = Release(pull=(0.0, 0.0, 2e-3), tied=(0.0, 0.0, 0.05))
     spread = release_spread(ROBOT, PLAN, deviation, jax.random.key(0), expected=wire, draws=512)
-    np.testing.assert_allclose(spread.rotation, released(ROBOT, PLAN, wire).rotation[-1], atol=1e-12)
+    same = released(ROBOT, PLAN, wire, substeps=1)
+    np.testing.assert_allclose(spread.rotation, same.rotation[-1], atol=1e-12)
     scale = np.sqrt(np.diag(spread.covariance))
     drawn = np.sqrt(np.diag(spread.drawn_covariance))
     np.testing.assert_allclose(drawn, scale, rtol=0.12)  # 512 draws: 3 %
@@ -126,3 +130,47 @@ def test_more_bad_input():
         release_spread(ROBOT, PLAN, Release(), jax.random.key(0), draws=0)
     with pytest.raises(ValueError, match="standard deviations must not be negative"):
         release_spread(ROBOT, PLAN, Release(drag=-1.0), jax.random.key(0))
+
+
+def test_a_wire_that_brakes_hard_is_resolved_or_refused():
+    """The robot follows its wire, which holds it: it hardly turns. No drag gives a number that is none."""
+    motion = released(ROBOT, PLAN, Release(drag=1.0))
+    assert motion.error < 1e-6
+    assert 0 < so3.angle(motion.rotation[-1]) < 1e-3
+    with pytest.raises(ValueError, match="is braked, too fast to be resolved: with .* steps a step still has"):
+        released(ROBOT, PLAN, Release(drag=1e12))
+    with pytest.raises(ValueError, match="more than .* steps of 0.1 rad would be taken. Give `steps`"):
+        release_spread(ROBOT, PLAN, Release(drag=1.0), jax.random.key(0), draws=1)
+
+
+@pytest.mark.parametrize("duration", [20.0, 40.0])
+def test_a_tumbling_body_near_its_middle_axis(duration):
+    """Moments 1, 2, 3, spinning almost about the second: as SciPy's DOP853 has it, within what the estimates say."""
+    moments, spin = np.array([1.0, 2.0, 3.0]), np.array([1e-3, 2.0, 1e-3])
+    body = reojax.make_robot(
+        mass=[1.0], com=np.zeros((1, 3)), inertia=[np.diag(moments)], axis=np.zeros((0, 3)), anchor=np.zeros((0, 3))
+    )
+
+    def slope(_, q):
+        omega = Rotation.from_quat(q).inv().apply(spin) / moments
+        return 0.5 * (np.append(np.cross(q[:3], omega), -q[:3] @ omega) + np.append(q[3] * omega, 0))
+
+    end = solve_ivp(slope, (0, duration), [0, 0, 0, 1.0], method="DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    exact, path = Rotation.from_quat(end).as_matrix(), reojax.polygon(np.zeros((2, 0)))
+    trajectory = reojax.along(path, "quintic", duration)
+    for motion in (
+        reojax.simulate(body, path, durations=duration, momentum=spin),
+        released(body, trajectory, Release(spin)),
+        reojax.simulate(body, path, durations=duration, momentum=spin, substeps=1),
+        released(body, trajectory, Release(spin), substeps=4),
+    ):
+        apart = float(so3.angle(exact.T @ motion.rotation[-1]))
+        assert apart < max(float(motion.error), 1e-6)
+    assert motion.error > 1e-5  # the last one has too few steps, and knows
+
+
+def test_what_the_steps_do_not_resolve_is_told(monkeypatch):
+    monkeypatch.setattr(_resolution, "MOST", 512)
+    with pytest.warns(UserWarning, match="too fast to be resolved: with 512 steps its orientation is uncertain by"):
+        motion = reojax.simulate(ROBOT, PATH, durations=1.0, momentum=[1e-2, 3e-2, 1e-2])
+    assert motion.error > 1e-3
