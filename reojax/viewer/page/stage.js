@@ -204,13 +204,14 @@ function addTarget(scene, reach) {
 // A robot: link shapes in frames that `pose` sets.
 function makeBody(robot, clip) {
   const root = new THREE.Group(), frames = [];
-  robot.links.forEach((link) => {
+  robot.links.forEach((link, k) => {
     const frame = new THREE.Group();
     frame.matrixAutoUpdate = false;
     const skin = clip.ghost
       ? new THREE.MeshStandardMaterial({ color: GHOST, transparent: true, opacity: 0.3, depthWrite: false, roughness: 0.8,
           polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 })
-      : new THREE.MeshStandardMaterial({ color: link.colour, roughness: 0.55, metalness: 0.05 });
+      : new THREE.MeshStandardMaterial({ color: link.colour, roughness: 0.55, metalness: 0.05,
+          polygonOffset: true, polygonOffsetFactor: 0.5 * k, polygonOffsetUnits: 8 * k }); // links may fill the same space
     link.capsules.forEach(([start, end, radius]) => frame.add(capsule(start, end, radius, skin)));
     if (link.faces.length) frame.add(new THREE.Mesh(quads(link.faces), skin));
     if (link.pin.length && !link.capsules.length && !clip.ghost) {
