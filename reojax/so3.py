@@ -93,7 +93,7 @@ def log(rotation: ArrayLike) -> Float[Array, "3"]:
 
 
 def angle(rotation: ArrayLike) -> Float[Array, ""]:
-    """Angle of a rotation, in [0, pi] [rad]; `angle(P.T @ Q)` is the distance between two rotations.
+    """Angle of a rotation [rad], in [0, pi]; `angle(P.T @ Q)` is the distance between two rotations.
 
     It has a kink at the identity, where its derivative is given as 0, and at half turns, where it is
     that of one side.

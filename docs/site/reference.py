@@ -12,7 +12,11 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("design", "plot", "robots", "sweeps")
 """Public packages whose own names are public too."""
 PAGES = {
-    "robots": ("Robots and models", "Robots from numbers, by name, and from files.", ("robot", "capsules", "robots", "models")),
+    "robots": (
+        "Robots and models",
+        "Robots from numbers, by name, and from files.",
+        ("robot", "capsules", "robots", "models"),
+    ),
     "mechanics": ("Mechanics", "The momentum equation, poses, dynamics, and the turn after a path.", ("mechanics",)),
     "paths": ("Paths and manoeuvres", "What the joints go through, without when.", ("path", "manoeuvres")),
     "so3": ("so3: rotations", "Safe values and gradients at the identity and at half turns.", ("so3",)),
@@ -21,11 +25,22 @@ PAGES = {
     "design": ("design", "Design problems, sensitivities and spread.", ("design", "optimisation")),
     "motion": ("Motion in time", "Time laws, motors, least time, control, releases.", ("motion",)),
     "steering": ("Steering", "Corrections on the way.", ("steering",)),
-    "captures": ("Captures and files", "Measured motion, calibration, files for other programs.", ("captures", "files", "interop")),
+    "captures": (
+        "Captures and files",
+        "Measured motion, calibration, files for other programs.",
+        ("captures", "files", "interop"),
+    ),
     "sweeps": ("Sweeps", "Any function over many designs.", ("sweeps",)),
     "viewer": ("Viewer and plot", "Pages for a browser, pictures and films.", ("viewer", "drawing", "plot")),
 }
 """Page -> title, a line below it, and the packages whose names are on it."""
+_ENTRY = """## {name}
+
+::: {where}
+    options:
+      show_root_heading: false
+      show_root_toc_entry: false
+"""
 _MODULES = {"so3"}
 """Modules that are public whole."""
 
@@ -40,7 +55,7 @@ def public_names() -> dict[str, str]:
     for package in PACKAGES:
         tree = ast.parse((ROOT / "reojax" / package / "__init__.py").read_text("utf-8"))
         for name, home in _imported(tree):
-            if home not in found.values() or f"reojax.{name}" not in found:
+            if found.get(f"reojax.{name}") != home:
                 found[f"reojax.{package}.{name}"] = home
     for module in _MODULES:
         for node in ast.parse((ROOT / "reojax" / f"{module}.py").read_text("utf-8")).body:
@@ -58,7 +73,7 @@ def pages() -> dict[str, str]:
         parts = [f"# {title}\n\n{line}\n"]
         for name in sorted(inside, key=lambda name: (name.count("."), name.lower())):
             last = name.rpartition(".")[2]
-            parts.append(f"## {name}\n\n::: {inside[name]}.{last}\n    options:\n      show_root_heading: false\n      show_root_toc_entry: false\n")
+            parts.append(_ENTRY.format(name=name, where=f"{inside[name]}.{last}"))
         if inside:
             written[f"reference/{page}.md"] = "\n".join(parts)
     return written

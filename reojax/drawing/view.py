@@ -41,5 +41,7 @@ def check_view(view: View) -> None:
 
 
 def default_view(robot: Robot) -> View:
-    """From the front; y up for robots laid out as the thesis's, whose spine is z; else z up, as robot files have it."""
-    return View(up="y" if robot.layout is not None else "z")
+    """From the front: y up for planar robots and those laid out as the thesis's, z up for others, as robot files do."""
+    axes = np.asarray(robot.axis, float)
+    planar = len(axes) > 0 and bool((np.abs(axes[:, :2]) < 1e-9).all())
+    return View(up="y" if robot.layout is not None or planar else "z")

@@ -57,7 +57,7 @@ def draw_frames(
         robot: the robot.
         frames: its poses, such as `frames_along` gives.
         titles: a line above each frame.
-        view: from where to look; default from the front, y up.
+        view: from where to look; default from the front.
 
     Raises:
         ValueError: if numbers of axes, frames and titles differ, or a pose does not fit the robot.
@@ -97,7 +97,7 @@ def frames_figure(
         title: above all; default the robot's name.
         titles: a line above each frame; default where along the path, in edges.
         columns: frames in one row; default all.
-        view: from where to look; default from the front, y up.
+        view: from where to look; default from the front.
         frames: the `frames_along` of the path with this `per_edge`, if they are known already.
 
     Raises:

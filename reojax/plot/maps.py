@@ -145,7 +145,7 @@ def draw_poses(
         rows: r labels at the left, the first at the bottom.
         theta: (j,) joint angles of all [rad]; default zeros.
         texts: r rows of c words below the robots.
-        view: from where to look; default from the front, y up.
+        view: from where to look; default from the front.
 
     Raises:
         ValueError: if numbers of robots, rotations and labels differ, or a pose does not fit a robot.

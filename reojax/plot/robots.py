@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import as_numbers
-from reojax.drawing.colours import BASE, INK, LINKS
+from reojax.drawing.capsules import capsule_faces
+from reojax.drawing.colours import INK, link_colour
 from reojax.drawing.solids import Faces, joint_faces, link_faces
-from reojax.drawing.view import View, check_view
+from reojax.drawing.view import View, check_view, default_view
 from reojax.plot._light import shade
 from reojax.robot import Robot
 
@@ -37,8 +38,8 @@ def draw_robot(
 ) -> Axes3D:
     """Draw a robot in 3-D axes, its centre of mass at `position`; equal scales, in metres.
 
-    Links are solids of the right mass and inertia between the robot's joints, as `reojax.plot` explains; the base
-    (link 0) is red, dark pins are joint axes. At zero momentum the centre of mass of a free-falling robot stays
+    Links are their capsules, or, where they have none, solids of the right mass and inertia between the joints; the
+    base (link 0) is red, dark pins are joint axes. At zero momentum the centre of mass of a free-falling robot stays
     where it is, so robots at one position are one robot at different times.
 
     Args:
@@ -47,7 +48,7 @@ def draw_robot(
         theta: (j,) joint angles [rad].
         rotation: (3, 3) of the base, base components to inertial ones; default the identity.
         position: (3,) of the robot's centre of mass [m].
-        view: from where to look; default from the front, y up. A later call may turn the view of all.
+        view: from where to look; default from the front. A later call may turn the view of all.
         alpha: opacity, 0 to 1.
         centres: mark the centres of mass of the links with dots, in front of everything.
 
@@ -59,7 +60,7 @@ def draw_robot(
     """
     if not isinstance(axes, Axes3D):
         raise ValueError(f"`axes` is a {type(axes).__name__}; robots need 3-D axes, projection='3d'.")
-    view = View() if view is None else view
+    view = default_view(robot) if view is None else view
     check_view(view)
     place = _vector("position", position, 3)
     faces, colours = faces_at_pose(robot, theta, rotation)
@@ -99,13 +100,13 @@ def draw_robot_flat(
         rotation: (3, 3) of the base, base components to inertial ones; default the identity.
         at: where, in the axes' units.
         scale: axes' units per metre, or one for each direction of the page.
-        view: from where to look; default from the front, y up.
+        view: from where to look; default from the front.
         alpha: opacity, 0 to 1.
 
     Raises:
         ValueError: if an argument has the wrong shape or is not finite.
     """
-    view = View() if view is None else view
+    view = default_view(robot) if view is None else view
     check_view(view)
     faces, colours = faces_at_pose(robot, theta, rotation)
     camera = view.camera()
@@ -145,7 +146,7 @@ def faces_at_pose(robot: Robot, theta: ArrayLike, rotation: ArrayLike | None = N
     links, pins = _parts(robot)
     for link, own in enumerate(links):
         faces.append(own @ turned[link].T + origin[link])
-        colours += [BASE if not link else LINKS[(link - 1) % len(LINKS)]] * len(own)
+        colours += [link_colour(link)] * len(own)
     for joint, own in enumerate(pins):
         faces.append(own @ turned[joint + 1].T + origin[joint + 1])
         colours += [INK] * len(own)
@@ -155,7 +156,12 @@ def faces_at_pose(robot: Robot, theta: ArrayLike, rotation: ArrayLike | None = N
 @lru_cache(maxsize=32)
 def _parts(robot: Robot) -> tuple[list[Faces], list[Faces]]:
     """Faces of links and joints; kept, as frames and animations draw one robot many times."""
-    return link_faces(robot), joint_faces(robot)
+    links, pins = link_faces(robot), joint_faces(robot)
+    for link in set(robot.capsule_link):
+        links[link] = np.concatenate([capsule_faces(*shape) for on, *shape in robot.capsules if on == link])
+        if link:
+            pins[link - 1] = pins[link - 1][:0]
+    return links, pins
 
 
 def poses(robot: Robot, theta: np.ndarray) -> tuple[Float[np.ndarray, "n 3 3"], Float[np.ndarray, "n 3"]]:

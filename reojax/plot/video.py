@@ -60,7 +60,7 @@ def animation(
         seconds: how long the path takes in the film. The last frame stays for a second.
         titles: a name for each edge.
         title: headline; default the robot's name.
-        view: from where to look; default from the front, y up.
+        view: from where to look; default from the front.
         progress: whether to show progress on stderr.
 
     Raises:
@@ -103,7 +103,7 @@ def animate(
         time: (m,) true times of the poses [s], to be told; default the share of the way.
         titles: a line above each frame.
         title: headline; default the robot's name.
-        view: from where to look; default from the front, y up.
+        view: from where to look; default from the front.
         progress: whether to show progress on stderr.
 
     Raises:

@@ -1,0 +1,53 @@
+"""The API reference has every public name, with a docstring that says shapes and units where there are any."""
+
+import importlib
+import importlib.util
+import inspect
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import reojax
+
+ROOT = Path(__file__).parents[2]
+_spec = importlib.util.spec_from_file_location("reference", ROOT / "docs" / "site" / "reference.py")
+assert _spec is not None
+assert _spec.loader is not None
+reference = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(reference)
+
+PAGES = reference.pages()
+NAMES = reference.public_names()
+
+
+def test_every_public_name_has_an_entry():
+    """Those of `reojax.__all__`, of `so3`, and of the public packages."""
+    entries = "\n".join(PAGES.values())
+    wanted = {f"reojax.{name}" for name in reojax.__all__ if not inspect.ismodule(getattr(reojax, name))}
+    for module in ("design", "plot", "robots", "sweeps", "so3"):
+        inside = importlib.import_module(f"reojax.{module}")
+        for name, value in vars(inside).items():
+            home = getattr(value, "__module__", "")
+            if name.startswith("_") or inspect.ismodule(value) or not home.startswith("reojax"):
+                continue
+            if f"reojax.{name}" not in NAMES and (module != "so3" or home == "reojax.so3") and callable(value):
+                wanted.add(f"reojax.{module}.{name}")
+    assert not {name for name in wanted if f"## {name}\n" not in entries}
+
+
+def test_entries_lead_to_what_they_name():
+    """The module that an entry points to defines a thing of that name."""
+    for name, home in NAMES.items():
+        assert hasattr(importlib.import_module(home), name.rpartition(".")[2]), name
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("mkdocs") is None, reason="no mkdocs: pip install reojax[docs]")
+def test_the_site_builds_without_a_warning(tmp_path):
+    """Broken links and signatures that do not fit their docstrings among them."""
+    command = ["mkdocs", "build", "--strict", "--quiet", "--site-dir", tmp_path / "site"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=None)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "site" / "reference" / "mechanics" / "index.html").stat().st_size > 10_000
