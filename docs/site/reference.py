@@ -57,8 +57,10 @@ def public_names() -> dict[str, str]:
         for name, home in _imported(tree):
             if found.get(f"reojax.{name}") != home:
                 found[f"reojax.{package}.{name}"] = home
-    for module in _MODULES:
-        for node in ast.parse((ROOT / "reojax" / f"{module}.py").read_text("utf-8")).body:
+    for module in (*_MODULES, *PACKAGES):
+        place = ROOT / "reojax" / module
+        file = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+        for node in ast.parse(file.read_text("utf-8")).body:
             if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
                 found[f"reojax.{module}.{node.name}"] = f"reojax.{module}"
     return found
