@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     try:
-        args = _parser().parse_args(join_negative_values(sys.argv[1:] if argv is None else argv))
+        args = parse(sys.argv[1:] if argv is None else argv)
         args.run(args)
         sys.stdout.flush()
     except BadInput as error:
@@ -56,6 +56,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:
         return _unprinted(error)
     return 0
+
+
+def parse(argv: Sequence[str]) -> argparse.Namespace:
+    """Read arguments; what would be run is `args.run(args)`."""
+    return _parser().parse_args(join_negative_values(argv))
 
 
 def _flush() -> int:

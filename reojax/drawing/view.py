@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from reojax._internal import checks
 from reojax.robot import Robot
 
 Up = Literal["x", "y", "z"]
@@ -42,6 +43,7 @@ def check_view(view: View) -> None:
 
 def default_view(robot: Robot) -> View:
     """From the front: y up for planar robots and those laid out as the thesis's, z up for others, as robot files do."""
+    checks.instance("robot", robot, Robot, "make_robot makes")
     axes = np.asarray(robot.axis, float)
     planar = len(axes) > 0 and bool((np.abs(axes[:, :2]) < 1e-9).all())
     return View(up="y" if robot.layout is not None or planar else "z")

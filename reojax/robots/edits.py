@@ -16,7 +16,8 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
 
     The mass of each end link is moved straight towards or away from its joint axis, all of it by the same factor
     `sqrt(inertia / present inertia)`: a foot of another length with the same steel insert. Mass and heights along
-    the axis stay, and the result is a possible rigid body at any positive inertia. The identity at the present one.
+    the axis stay, capsules go along, and the result is a possible rigid body at any positive inertia. The identity at the
+    present one.
 
     Args:
         robot: the prototype, or a changed copy of it.
@@ -35,8 +36,10 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
         _like(robot)[1], (robot.mass, robot.com, robot.inertia, robot.axis, robot.anchor)
     )
 
-    def stretch(link: int, axis: Any, point: Any) -> tuple[Any, Any]:
-        """Centre of mass and inertia: polynomials in the factor by which the mass moves."""
+    start, end = (_like(robot)[1](x) for x in (robot.capsule_start, robot.capsule_end))
+
+    def stretch(link: int, axis: Any, point: Any) -> tuple[Any, Any, Any]:
+        """Centre of mass and inertia, polynomials in the factor by which the mass moves; and the capsules' ends."""
         along = axis[:, None] * axis[None, :]
         across = np.eye(3, dtype=com.dtype) - along
         lever = com[link] - point
@@ -48,10 +51,13 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
             part = left @ (moment[link].trace() / 2 * np.eye(3, dtype=com.dtype) - moment[link]) @ right
             return cast(part.trace() * np.eye(3, dtype=com.dtype) - part)
 
+        own = np.array([on == link for on in robot.capsule_link], bool)[:, None]
+        shapes = [xp.where(own, (factor - 1) * cast((x - point[None]) @ across), 0) for x in (start, end)]
         mixed = inertia(along, across) + inertia(across, along)
         return (
             cast(still) + factor * cast(moving),
             inertia(along, along) + factor * (mixed + factor * inertia(across, across)),
+            shapes,
         )
 
     with jax.default_matmul_precision("highest"):  # or a GPU takes 10 bits of float32
@@ -59,6 +65,8 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
     return robot.replace(
         com=xp.stack([first[0], *cast(com[1:3]), last[0]]),
         inertia=xp.stack([first[1], *cast(moment[1:3]), last[1]]),
+        capsule_start=cast(start) + first[2][0] + last[2][0],
+        capsule_end=cast(end) + first[2][1] + last[2][1],
     )
 
 

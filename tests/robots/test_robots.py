@@ -408,3 +408,17 @@ def test_every_name_is_a_robot_that_can_be(name):
 def test_an_unknown_name_lists_the_known_ones():
     with pytest.raises(ValueError, match="no robot named 'cat'.*prototype, six_body, planar2"):
         robots.by_name("cat")
+
+
+def test_capsules_of_the_ends_go_with_their_mass():
+    """A heavier end is a longer foot: its farthest capsule end moves out from the axis by the mass's factor."""
+    robot = robots.prototype()
+    present = 70e-6
+    changed = robots.with_end_inertia(robot, 4 * present)
+    last = [k for k, link in enumerate(robot.capsule_link) if link == 3]
+    for ends in ("capsule_start", "capsule_end"):
+        before, after = (np.asarray(getattr(r, ends), float) for r in (robot, changed))
+        np.testing.assert_allclose(after[last][:, :2], 2 * before[last][:, :2], atol=1e-12)  # the axis is z
+        np.testing.assert_allclose(after[last][:, 2], before[last][:, 2], atol=1e-12)
+        middle = [k for k, link in enumerate(robot.capsule_link) if link in (1, 2)]
+        np.testing.assert_array_equal(after[middle], before[middle])
