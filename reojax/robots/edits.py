@@ -16,8 +16,8 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
 
     The mass of each end link is moved straight towards or away from its joint axis, all of it by the same factor
     `sqrt(inertia / present inertia)`: a foot of another length with the same steel insert. Mass and heights along
-    the axis stay, capsules go along, and the result is a possible rigid body at any positive inertia. The identity at the
-    present one.
+    the axis stay, capsules go along, and the result is a possible rigid body at any positive inertia. The identity at
+    the present one.
 
     Args:
         robot: the prototype, or a changed copy of it.
