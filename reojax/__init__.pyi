@@ -25,6 +25,7 @@ from reojax.mechanics.kinematics import LinkPoses, centre_of_mass, link_poses
 from reojax.mechanics.momentum import MomentumMatrices, angular_momentum, connection, momentum_matrices
 from reojax.models.json_file import save_robot
 from reojax.models.load import load_robot
+from reojax.models.mjcf_writer import write_mjcf
 from reojax.motion.fastest import Fastest, fastest_loop, free_law, overlap
 from reojax.motion.least_time import LeastTime, minimum_stretch, minimum_time
 from reojax.motion.motor import RE_MAX_17, Motor, no_load_speed, stall_torque, with_motors
@@ -146,6 +147,7 @@ __all__ = [
     "view",
     "with_motors",
     "write_gains",
+    "write_mjcf",
     "write_trajectory",
     "zipped",
 ]
