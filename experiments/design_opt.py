@@ -1,6 +1,6 @@
 """Which loop rolls the thesis's robot by exactly 180 degrees with least joint travel, and what do feet and gears trade?
 
-    python experiments/design_opt.py                # about three minutes on 2 cores, compilation included
+    python experiments/design_opt.py                # under a minute on 2 quiet cores, compilation included
     python experiments/design_opt.py --target 120 --quick
 
 First the prototype as it is, within 270/120: the best rectangle, polygon and smooth loop (spline) whose whole net
@@ -17,7 +17,6 @@ ends at its bound; past about 100 kg mm^2 heavier feet gain no more (thesis figu
 from pathlib import Path
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from common.script import options, run
 from common.tables import gradient_error, least_travel, summary, table
@@ -25,7 +24,7 @@ from matplotlib.figure import Figure
 
 import reojax
 from reojax import design, plot
-from reojax.design import Solution
+from reojax.design import Problem, Variable
 from reojax.files import check_writable, write_json
 from reojax.robots import prototype, with_end_inertia, with_gear_ratio
 
@@ -106,59 +105,38 @@ def best_loops(roll: float, *, quick: bool) -> list[dict[str, Any]]:
     return answers
 
 
-def travel_of(x: Any, data: Any) -> Any:
-    """Travel of manoeuvre A; x: twist, bend [rad], and inertia and ratio as fractions of their ranges in `data`."""
-    return 4 * x[0] + 2 * x[1]
-
-
-def robot_of(x: Any, data: Any) -> reojax.Robot:
-    """The prototype with the end link inertia and gear ratio of x."""
-    inertia, ratio = data["low"] + (data["high"] - data["low"]) * x[2:]
-    return with_gear_ratio(with_end_inertia(prototype(), inertia * 1e-6), ratio)
-
-
-def roll_of(x: Any, data: Any) -> Any:
-    """Roll less the target [rad], smooth at half turns; `data["sine"]`, `["cosine"]` of half the target."""
-    w, _, _, z = reojax.so3.to_quaternion(reojax.net_rotation(robot_of(x, data), reojax.manoeuvre_a(x[0], x[1])))
-    cosine, sine = w * data["cosine"] + z * data["sine"], z * data["cosine"] - w * data["sine"]
-    side = jnp.where(cosine < 0, -1.0, 1.0)
-    return jnp.stack([2 * jnp.arctan2(side * sine, side * cosine)])
-
-
 def trade_off(roll: float, *, points: int) -> dict[str, dict[str, Any]]:
     """Least travel over the end link inertia, and over the gear ratio, with the other one as in the thesis or free."""
     names = ("end inertia [kg mm^2]", "gear ratio")
+    problem = Problem(
+        lambda values: (
+            with_gear_ratio(with_end_inertia(prototype(), values["inertia"]), values["ratio"]),
+            reojax.manoeuvre_a(values["twist"], values["bend"]),
+        ),
+        [
+            Variable("twist", 0, 270, "deg"),
+            Variable("bend", 0, 120, "deg"),
+            Variable("inertia", LOWER[0], UPPER[0], "kg mm^2"),
+            Variable("ratio", LOWER[1], UPPER[1]),
+        ],
+        objective=lambda outcome: 4 * outcome.values["twist"] + 2 * outcome.values["bend"],
+        equality=[design.turned_about([0, 0, 1], roll)],
+    )
     grids = [np.unique(np.append(np.linspace(LOWER[k], UPPER[k], points), THESIS[k])) for k in (0, 1)]
-    low, high = [], []
+    # one problem a row: the parameter on the axis, the other one as in the thesis or free (NaN)
+    held = []
     for k, grid in enumerate(grids):
         for value in grid:
-            for free in (False, True):
-                ends = np.stack([LOWER, UPPER] if free else [THESIS, THESIS])
-                ends[:, k] = value
-                low.append(ends[0])
-                high.append(ends[1])
-    starts = np.deg2rad([[200.0, 80.0], [260.0, 110.0], [120.0, 115.0]])
-    many, count = len(low), len(starts)
-    data = {
-        "low": np.repeat(low, count, axis=0),
-        "high": np.repeat(high, count, axis=0),
-        "sine": np.full(many * count, np.sin(roll / 2)),
-        "cosine": np.full(many * count, np.cos(roll / 2)),
-    }
-    x = np.concatenate([np.tile(starts, (many, 1)), np.full((many * count, 2), 0.5)], axis=1)
-    found = design.optimise(
-        travel_of,
-        x,
-        lower=np.array([0.0, 0.0, 0.0, 0.0]),
-        upper=np.array([np.deg2rad(270), np.deg2rad(120), 1.0, 1.0]),
-        equality=roll_of,
-        data=data,
-        max_steps=100,
-        progress="trade-off",
-    )
-    best, converged = _best_of(found, count)
-    travel = np.rad2deg(found.cost[best])
-    other = data["low"][best] + (data["high"] - data["low"])[best] * found.value[best, 2:]
+            for other in (THESIS[1 - k], np.nan):
+                held.append((value, other) if k == 0 else (other, value))
+    inertia, ratio = np.transpose(held)
+    middle = 0.5 * (LOWER + UPPER) * [1e-6, 1]
+    starts = [[*np.deg2rad(loop), *middle] for loop in ([200.0, 80.0], [260.0, 110.0], [120.0, 115.0])]
+    found = problem.solve_each(
+        {"inertia": 1e-6 * inertia, "ratio": ratio}, starts, max_steps=100, progress="trade-off"
+    ).pick()
+    travel, converged = np.rad2deg(found.cost), found.converged
+    other = found.value[:, 2:] * [1e6, 1]
     curves, place = {}, 0
     for k, grid in enumerate(grids):
         part = slice(place, place + 2 * len(grid))
@@ -170,12 +148,6 @@ def trade_off(roll: float, *, points: int) -> dict[str, dict[str, Any]]:
             "other": other[part].reshape(-1, 2, 2)[:, 1, 1 - k].tolist(),
         }
     return curves
-
-
-def _best_of(found: Solution, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Index of the best start of each problem, `count` in a row, and whether it converged."""
-    cost = np.where(found.converged, found.cost, np.inf).reshape(-1, count)
-    return cost.argmin(1) + count * np.arange(len(cost)), np.isfinite(cost.min(1))
 
 
 def _picture(loops: list[dict[str, Any]], curves: dict[str, dict[str, Any]], target: float) -> Figure:
