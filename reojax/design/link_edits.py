@@ -1,7 +1,8 @@
 """Changes of a robot's links that keep every link a possible rigid body; arguments may be traced.
 
 A body's second moments of mass `P = tr(I)/2 - I` (about its centre) are positive semidefinite. Stretching the body by a
-matrix S takes P to S P S^T, which still is, so that `I = tr(P) - P` belongs to a body again.
+matrix S takes P to S P S^T, which still is, so that `I = tr(P) - P` belongs to a body again. Links and joints are given
+by number or by name.
 """
 
 from typing import Any
@@ -11,48 +12,49 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax._internal.arrays import as_numbers, is_concrete
 from reojax.robot import Robot
 
 
-def with_mass(robot: Robot, link: int, mass: ArrayLike) -> Robot:
+def with_mass(robot: Robot, link: int | str, mass: ArrayLike) -> Robot:
     """Another mass [kg] of the same shape: the link's inertia is scaled with it.
 
     Raises:
         ValueError: if there is no such link, or `mass` is not one positive number.
     """
-    index, wanted = _link(robot, link), _positive("mass", mass)
+    index, wanted = checks.index_of("link", link, robot.link_names, "link"), _positive("mass", mass)
     share = wanted / robot.mass[index]
     return robot.replace(
         mass=_set_link(robot.mass, index, wanted), inertia=_set_link(robot.inertia, index, share * robot.inertia[index])
     )
 
 
-def with_com_offset(robot: Robot, link: int, offset: ArrayLike) -> Robot:
+def with_com_offset(robot: Robot, link: int | str, offset: ArrayLike) -> Robot:
     """Centre of mass moved by `offset` (3,) [m] in the link's frame, the inertia about it as before.
 
     Raises:
         ValueError: if there is no such link, or `offset` is not of shape (3,).
     """
-    index, move = _link(robot, link), as_numbers("offset", offset)
+    index, move = checks.index_of("link", link, robot.link_names, "link"), as_numbers("offset", offset)
     if move.shape != (3,):
         raise ValueError(f"`offset` has shape {move.shape}; it must be (3,), in m.")
     return robot.replace(com=_set_link(robot.com, index, robot.com[index] + move))
 
 
-def with_length(robot: Robot, link: int, factor: ArrayLike, *, along: ArrayLike | None = None) -> Robot:
+def with_length(robot: Robot, link: int | str, factor: ArrayLike, *, along: ArrayLike | None = None) -> Robot:
     """The link stretched by `factor` from its frame's origin, mass kept: its shape, and the joints that it carries.
 
     Args:
         robot: the robot.
-        link: index of the link.
+        link: number or name of the link.
         factor: new length over old.
         along: (3,) direction of the stretch in the link's frame; default every direction.
 
     Raises:
         ValueError: if there is no such link, `factor` is not one positive number, or `along` is no direction.
     """
-    index, scale = _link(robot, link), _positive("factor", factor)
+    index, scale = checks.index_of("link", link, robot.link_names, "link"), _positive("factor", factor)
     share = np.eye(3)
     if along is not None:
         direction = np.asarray(as_numbers("along", along), float)
@@ -65,7 +67,7 @@ def with_length(robot: Robot, link: int, factor: ArrayLike, *, along: ArrayLike 
     return robot.replace(anchor=jnp.where(carried, robot.anchor @ stretch, robot.anchor))
 
 
-def with_joint_inertia(robot: Robot, joint: int, inertia: ArrayLike) -> Robot:
+def with_joint_inertia(robot: Robot, joint: int | str, inertia: ArrayLike) -> Robot:
     """The link that a joint carries with another inertia about that joint's axis [kg m^2], mass and heights kept.
 
     All its mass is moved straight towards or away from the axis by one factor, as in `robots.with_end_inertia`.
@@ -73,17 +75,16 @@ def with_joint_inertia(robot: Robot, joint: int, inertia: ArrayLike) -> Robot:
     Raises:
         ValueError: if there is no such joint, or `inertia` is not one positive number.
     """
-    if isinstance(joint, bool) or not isinstance(joint, int | np.integer) or not 0 <= joint < robot.joints:
-        raise ValueError(f"`joint` is {joint!r}; {robot.name!r} has joints 0 to {robot.joints - 1}.")
-    wanted, link = _positive("inertia", inertia), joint + 1
-    axis, com = robot.axis[joint], robot.com[link]
+    number = checks.index_of("joint", joint, robot.joint_names, "joint")
+    wanted, link = _positive("inertia", inertia), number + 1
+    axis, com = robot.axis[number], robot.com[link]
     along = axis[:, None] * axis[None, :]
     across = np.eye(3, dtype=along.dtype) - along
     present = (along * robot.inertia[link]).sum() + robot.mass[link] * (com @ across @ com)
     return _stretch(robot, link, jnp.sqrt(wanted / present) * across + along, jnp.zeros_like(com))
 
 
-def _stretch(robot: Robot, link: int, stretch: jax.Array, fixed: jax.Array) -> Robot:
+def _stretch(robot: Robot, link: int | str, stretch: jax.Array, fixed: jax.Array) -> Robot:
     """Stretch a link's body about the point `fixed`."""
     inertia = robot.inertia[link]
     spread = 0.5 * jnp.trace(jnp.asarray(inertia)) * jnp.eye(3, dtype=inertia.dtype) - inertia
@@ -97,12 +98,6 @@ def _stretch(robot: Robot, link: int, stretch: jax.Array, fixed: jax.Array) -> R
 
 def _set_link(array: Any, index: int, value: Any) -> jax.Array:
     return jnp.asarray(array).at[index].set(value)
-
-
-def _link(robot: Robot, link: int) -> int:
-    if isinstance(link, bool) or not isinstance(link, int | np.integer) or not 0 <= link < robot.links:
-        raise ValueError(f"`link` is {link!r}; {robot.name!r} has links 0 to {robot.links - 1}.")
-    return int(link)
 
 
 def _positive(entry: str, value: ArrayLike) -> Any:

@@ -34,9 +34,7 @@ def turned_to(target: ArrayLike | str) -> Measure:
     if isinstance(target, str):
         name = target
         return lambda outcome: so3.log(so3.exp(outcome.values[name]).T @ outcome.rotation)
-    matrix = numbers("target", target, (3, 3))
-    if np.abs(matrix.T @ matrix - np.eye(3)).max() > 1e-6 or np.linalg.det(matrix) < 0:
-        raise ValueError(f"`target` is {matrix.tolist()}; it must be a rotation matrix.")
+    matrix = checks.rotations("target", target)
 
     def measure(outcome: Outcome) -> Array:
         return so3.log(jnp.asarray(matrix.T, outcome.rotation.dtype) @ outcome.rotation)
@@ -52,9 +50,9 @@ def turned_about(axis: ArrayLike, angle: float) -> Measure:
         angle: wanted turn, right-handed [rad].
 
     Raises:
-        ValueError: if the axis is no direction.
+        ValueError: if the axis is no direction, or the angle no number.
     """
-    unit = _unit(axis)
+    unit, angle = _unit(axis), checks.number("angle", angle, unit="rad")
     half = np.array([np.cos(angle / 2), *(-np.sin(angle / 2) * unit)])
 
     def measure(outcome: Outcome) -> Array:
@@ -79,7 +77,7 @@ def off_axis_within(axis: ArrayLike, angle: float) -> Measure:
         ValueError: if the axis is no direction, or the angle is not between 0 and pi.
     """
     unit = _unit(axis)
-    if not 0 < angle < np.pi:
+    if not 0 < checks.number("angle", angle, unit="rad") < np.pi:
         raise ValueError(f"`angle` is {angle!r}; it must be between 0 and pi.")
 
     def measure(outcome: Outcome) -> Array:
@@ -131,14 +129,15 @@ def clear_by(margin: float, *, samples: int | None = None) -> Measure:
     return measure
 
 
-def bend_within(joint: int, name: str) -> Measure:
+def bend_within(joint: int | str, name: str) -> Measure:
     """Whether the joint's angle stays within plus and minus the variable `name` [rad], for an inequality.
 
     Least peak bend is smooth this way: let `name` be a variable, and make it the objective.
     """
 
     def measure(outcome: Outcome) -> Array:
-        angle, most = jnp.asarray(outcome.path.waypoints)[:, joint], outcome.values[name]
+        number = checks.index_of("joint", joint, outcome.robot.joint_names, "joint")
+        angle, most = jnp.asarray(outcome.path.waypoints)[:, number], outcome.values[name]
         return jnp.concatenate([angle - most, -angle - most])
 
     return measure

@@ -1,4 +1,4 @@
-"""The last steps towards a fastest motion: its net rotation to rounding, and its joints within their limits exactly.
+"""Feasibility restoration of a fastest motion: its net rotation to rounding, its joints within their limits exactly.
 
 An optimiser looks at a motion at samples, and stops a little off. But the motion is a polynomial by pieces, so that it
 is known where its joints are farthest; each step here is the least change of the unknowns that to first order puts the
@@ -8,14 +8,16 @@ net rotation right and leaves no joint beyond its limits.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from reojax._internal.arrays import Array
 from reojax.motion.trajectory import Trajectory
+from reojax.optimisation.quadratic import solve_quadratic
 from reojax.robot import Robot
 
 _CLEAR = 1e-9
@@ -24,40 +26,62 @@ _STEPS = 10
 _FAR = -0.5
 """What is further from its limit than this is left out of a step."""
 
-Look = Callable[[Any, Any], tuple[Any, Any]]
-"""From unknowns (n,) and shares of the pieces (2, p, j) to numbers (r,) and their derivatives (r, n)."""
+
+class Conditions(NamedTuple):
+    """What a motion must meet, as functions of its unknowns."""
+
+    equality: Float[Array, " p"]
+    """Must be zero: the rotation vector from the net rotation wanted, or nothing."""
+    inequality: Float[Array, " q"]
+    """Must not be positive."""
+
+
+class Linearised(NamedTuple):
+    """The same with their derivatives by the unknowns."""
+
+    equality: Float[Array, " p"]
+    inequality: Float[Array, " q"]
+    equality_jacobian: Float[Array, "p n"]
+    inequality_jacobian: Float[Array, "q n"]
+
+
+def with_jacobian(function: Callable[[Any, Any], Conditions]) -> Callable[[Any, Any], Linearised]:
+    """Conditions of the unknowns (n,) and of shares of the pieces (2, p, j), with derivatives by the unknowns."""
+
+    def both(x: Array, share: Array) -> Linearised:
+        slope, value = jax.jacfwd(lambda x: (function(x, share),) * 2, has_aux=True)(x)
+        return Linearised(*value, *slope)
+
+    return jax.jit(both)
 
 
 def restore_feasibility(
-    look: Look,
+    linearise: Callable[[Any, Any], Linearised],
     build: Callable[[Any], Trajectory],
     miss: Callable[[Trajectory], Any],
     start: Float[np.ndarray, " n"],
     box: tuple[np.ndarray, np.ndarray, np.ndarray],
-    equal: int,
 ) -> Float[np.ndarray, " n"]:
     """Return the unknowns of a motion, changed little, for the net rotation wanted and all joints within limits.
 
     Args:
-        look: what must vanish, the first `equal` numbers, and what must not be positive, the others.
+        linearise: conditions of the motion and their derivatives.
         build: makes the motion.
-        miss: of a motion, what `look` gives roughly in its first numbers.
+        miss: of a motion, exactly what the equality gives roughly.
         start: the unknowns.
         box: least and largest unknowns, and their scales.
-        equal: how many numbers must vanish, 3 or 0.
     """
     lower, upper, scale = box
     x = start
     for _ in range(_STEPS):
         trajectory = build(x)
-        value, slope = (np.array(part) for part in look(x, farthest(trajectory)))
-        if equal:
-            value[:equal] = miss(trajectory)
-        value[equal:] += _CLEAR
-        if np.abs(value[:equal]).max(initial=0) < 1e-12 and value[equal:].max(initial=0) <= 0:
+        now = Linearised(*(np.array(part) for part in linearise(x, farthest(trajectory))))
+        if now.equality.size:
+            now = now._replace(equality=np.asarray(miss(trajectory)))
+        now = now._replace(inequality=now.inequality + _CLEAR)
+        if np.abs(now.equality).max(initial=0) < 1e-12 and now.inequality.max(initial=0) <= 0:
             break
-        change = least_norm_step(value, slope * scale, equal, (lower - x) / scale, (upper - x) / scale)
-        x = np.clip(x + scale * change, lower, upper)
+        x = np.clip(x + scale * least_norm_step(now, scale, (lower - x) / scale, (upper - x) / scale), lower, upper)
     return x
 
 
@@ -96,21 +120,11 @@ def farthest(trajectory: Trajectory) -> Float[np.ndarray, "2 p j"]:
     return share
 
 
-def least_norm_step(
-    value: np.ndarray, slope: np.ndarray, equal: int, lower: np.ndarray, upper: np.ndarray
-) -> np.ndarray:
-    """Least change with `value + slope @ change` zero in the first `equal` rows and not positive in the others."""
-    from scipy.optimize import minimize
-
-    near = np.concatenate([np.arange(equal), equal + np.flatnonzero(value[equal:] > _FAR)])
-    value, slope = value[near], slope[near]
-    constraints = [
-        {"type": kind, "fun": lambda u, r=rows: -(value[r] + slope[r] @ u), "jac": lambda u, r=rows: -slope[r]}
-        for kind, rows in (("eq", slice(0, equal)), ("ineq", slice(equal, None)))
-        if len(value[rows])
-    ]
-    answer = minimize(
-        lambda u: 0.5 * u @ u, np.clip(0 * lower, lower, upper), jac=lambda u: u, method="SLSQP",
-        bounds=list(zip(lower, upper, strict=True)), constraints=constraints, options={"ftol": 1e-24, "maxiter": 50},
-    )  # fmt: skip
-    return np.where(np.isfinite(answer.x), answer.x, 0)
+def least_norm_step(now: Linearised, scale: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Least scaled change with `equality + jacobian @ change` zero, `inequality + jacobian @ change` not positive."""
+    near = now.inequality > _FAR
+    rows = np.concatenate([now.equality_jacobian, now.inequality_jacobian[near]]) * scale
+    offset = np.concatenate([now.equality, now.inequality[near]])
+    n = len(scale)
+    step = solve_quadratic(np.eye(n), np.zeros(n), rows, offset, now.equality.size, lower, upper)
+    return step.d if step.solved else np.zeros(n)

@@ -11,12 +11,13 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reojax._internal.arrays import Array, as_numbers
+from reojax._internal import checks
+from reojax._internal.arrays import Array
 from reojax.mechanics.holonomy import net_rotation
 from reojax.motion._optimal_control import Fastest as Fastest, Task, UnknownBox, least_duration
 from reojax.motion.least_time import minimum_time
 from reojax.motion.motor import Motor, check_motors
-from reojax.motion.time_laws import Law, quintic, trapezoid
+from reojax.motion.time_laws import Law, check_law, quintic, trapezoid
 from reojax.motion.trajectory import Trajectory, along, overlap_pieces, through
 from reojax.path import Path
 from reojax.robot import Robot
@@ -26,7 +27,7 @@ def overlap(
     robot: Robot,
     path: Path,
     motors: Motor | Sequence[Motor],
-    law: Law | None = None,
+    law: Law | str | None = None,
     *,
     max_steps: int = 100,
     progress: str | None = None,
@@ -40,14 +41,16 @@ def overlap(
         robot: the robot; its rotor inertias and gear ratios hold, and its limits.
         path: the path in shape space, with numbers that can be read: not under `jit`.
         motors: motors of the joints, one for all or one for each.
-        law: the time law of every move; default `quintic()`.
+        law: the time law of every move, or its name; default `quintic()`.
         max_steps: most steps of the optimiser.
         progress: what to write before a bar on stderr; default no bar.
 
     Raises:
-        ValueError: as `minimum_time`.
+        ValueError: as `minimum_time`, and for a path that stays where it is.
     """
-    law = quintic() if law is None else law
+    law = quintic() if law is None else check_law(law)
+    checks.whole("max_steps", max_steps)
+    _check_moves(path)
     least = minimum_time(robot, path, motors, law)
     corners = np.asarray(path.waypoints, float)
     moves = tuple((int(e), int(k)) for e, k in np.argwhere(np.diff(corners, axis=0) != 0))
@@ -90,13 +93,27 @@ def free_law(
 ) -> Fastest:
     """Run a path, corners and all, by the fastest time law of each edge: a spline through `points` free points.
 
-    Arguments and errors as for `overlap`; the path and so the net rotation stay.
+    The path and so the net rotation stay.
+
+    Args:
+        robot: the robot; its rotor inertias and gear ratios hold, and its limits.
+        path: the path in shape space, with numbers that can be read: not under `jit`.
+        motors: motors of the joints, one for all or one for each.
+        points: free points of each edge's law, 1 or more.
+        max_steps: most steps of the optimiser.
+        progress: what to write before a bar on stderr; default no bar.
+
+    Raises:
+        ValueError: as `overlap`, and for `points` that is no positive integer.
     """
+    checks.whole("points", points)
+    checks.whole("max_steps", max_steps)
+    _check_moves(path)
     least = minimum_time(robot, path, motors, trapezoid())
     edges = path.edges
     corners = np.asarray(path.waypoints, float)
-    law = trapezoid()
-    place = np.array([_value(law, u) for u in np.arange(1, points + 1) / (points + 1)])
+    edge = along(Path(np.array([[0.0], [1.0]])), trapezoid(), np.ones(1))
+    place = np.array([float(edge.at(u).theta[0]) for u in np.arange(1, points + 1) / (points + 1)])
 
     def build(x: Array) -> Trajectory:
         inner = jnp.concatenate([jnp.zeros((edges, 1)), x[edges:].reshape(edges, points), jnp.ones((edges, 1))], 1)
@@ -142,9 +159,17 @@ def fastest_loop(
         progress: what to write before a bar on stderr; default no bar.
 
     Raises:
-        ValueError: as `minimum_time`, and for a target that is no rotation.
+        ValueError: as `minimum_time`, for a target that is no rotation, fewer than 3 `knots`, no `starts`, or a path
+            that is not closed or stays where it is.
     """
-    goal = _rotation(target)
+    goal = jnp.asarray(checks.rotations("target", target))
+    checks.whole("knots", knots, 3)
+    checks.whole("starts", starts)
+    checks.whole("max_steps", max_steps)
+    checks.whole("seed", seed, 0)
+    _check_moves(near, "near")
+    if not np.allclose(near.waypoints[0], near.waypoints[-1], rtol=0, atol=1e-9):
+        raise ValueError("`near` does not end where it begins; it must be a closed path.")
     motors = check_motors(motors, robot)
     least = minimum_time(robot, near, motors)
     law, joints = quintic(), robot.joints
@@ -168,20 +193,14 @@ def fastest_loop(
     return least_duration(task, np.clip(first, low, high), UnknownBox(low, high, scale), max_steps, progress)
 
 
+def _check_moves(path: Path, entry: str = "path") -> None:
+    corners = np.asarray(checks.instance(entry, path, Path, "polygon(...)").waypoints)
+    if np.issubdtype(corners.dtype, np.floating) and len(corners) > 1 and not np.diff(corners, axis=0).any():
+        raise ValueError(f"`{entry}` stays where it is; there is no motion to be made fast.")
+
+
 def join(parts: Sequence[Trajectory]) -> Trajectory:
     """One trajectory after the other; each must begin where the one before it ends."""
     begin = jnp.cumsum(jnp.stack([jnp.zeros_like(parts[0].duration), *(part.duration for part in parts)]))
     breaks = [part.breaks[:-1] + start for part, start in zip(parts, begin[:-1], strict=True)]
     return Trajectory(jnp.concatenate([*breaks, begin[-1:]]), jnp.concatenate([part.coefficients for part in parts]))
-
-
-def _value(law: Law, u: float) -> float:
-    piece = int(np.clip((np.asarray(law.breaks) <= u).sum() - 1, 0, len(law.coefficients) - 1))
-    return float(np.polyval(np.asarray(law.coefficients)[piece][::-1], u - np.asarray(law.breaks)[piece]))
-
-
-def _rotation(target: ArrayLike) -> Array:
-    matrix = np.asarray(as_numbers("target", target), float)
-    if matrix.shape != (3, 3) or not np.allclose(matrix.T @ matrix, np.eye(3), atol=1e-6) or np.linalg.det(matrix) < 0:
-        raise ValueError(f"`target` is {matrix.tolist()}; it must be a rotation matrix (3, 3).")
-    return jnp.asarray(matrix)

@@ -41,14 +41,25 @@ class Derivatives(NamedTuple):
 class Functions(NamedTuple):
     """What is to be compiled; hashable. Several functions of a kind are differentiated apart, each in its best mode."""
 
-    cost: Function
+    cost: Function | None
     equality: tuple[Function, ...]
     inequality: tuple[Function, ...]
     with_data: bool
+    together: Function | None = None
+    """To (cost, equality, inequality) at once, instead of the three, where these share most of their work."""
 
-    def call(self, function: Function, x: Array, data: Any) -> Array:
-        """One function at one point."""
-        return jnp.asarray(function(x, data) if self.with_data else function(x))
+    def parts(self) -> list[Callable[[Array, Any], tuple[list[Array], list[Array], list[Array]]]]:
+        """Functions of x and data, each with what it has of costs, equalities and inequalities."""
+        call = lambda f, x, data: f(x, data) if self.with_data else f(x)
+        one = lambda f, x, data: [jnp.asarray(call(f, x, data))]
+        if self.together is not None:
+            together = self.together
+            return [lambda x, data: tuple([jnp.asarray(array)] for array in call(together, x, data))]
+        return [
+            lambda x, data: (one(self.cost, x, data), [], []),
+            *(lambda x, data, f=f: ([], one(f, x, data), []) for f in self.equality),
+            *(lambda x, data, f=f: ([], [], one(f, x, data)) for f in self.inequality),
+        ]
 
 
 class Programs:
@@ -102,19 +113,30 @@ def _compile(
 ) -> tuple[Function, Function, int]:
     """Both programs and the number of equalities. Only the last few are kept, as they hold on to a user's functions."""
 
+    parts = functions.parts()
+
     def values(x: Array, data: Any) -> tuple[Array, Array]:
-        cost, equality, inequality = (
-            [functions.call(f, x, data) for f in kind]
-            for kind in ((functions.cost,), functions.equality, functions.inequality)
-        )
-        _check(cost, equality, inequality)
-        return cost[0], _join(equality + inequality, x, 1)
+        found = [part(x, data) for part in parts]
+        for kinds in found:
+            _check(*kinds)
+        rows = [array for kind in (1, 2) for kinds in found for array in kinds[kind]]
+        return sum(array for kinds in found for array in kinds[0]), _join(rows, x, 1)
 
     def derivatives(x: Array, data: Any) -> tuple[Array, Array, Array, Array]:
-        call = lambda f: _differentiate(lambda x: functions.call(f, x, data), x)
-        (cost, gradient), *pairs = [call(f) for f in (functions.cost, *functions.equality, *functions.inequality)]
-        rows, jacobian = ([pair[i] for pair in pairs] for i in (0, 1))
-        return cost, _join(rows, x, 1), gradient, _join(jacobian, x, 2)
+        cost, gradient, rows, jacobian = [], [], ([], []), ([], [])
+        for part in parts:
+            kinds = jax.eval_shape(part, x, data)
+            sizes = [sum(array.size for array in kind) for kind in kinds]
+            every = lambda x, part=part: _join([jnp.ravel(a) for kind in part(x, data) for a in kind], x, 1)
+            value, slope = _differentiate(every, x)
+            ends = np.cumsum(sizes)
+            if sizes[0]:
+                cost.append(value[0])
+                gradient.append(slope[0])
+            for kind in (0, 1):
+                rows[kind].append(value[ends[kind] : ends[kind + 1]])
+                jacobian[kind].append(slope[ends[kind] : ends[kind + 1]])
+        return sum(cost), _join(rows[0] + rows[1], x, 1), sum(gradient), _join(jacobian[0] + jacobian[1], x, 2)
 
     def lower(function: Function, block: int) -> Any:
         leaves = [jax.ShapeDtypeStruct((block, *shape), leaf) for shape, leaf in types]
@@ -123,10 +145,7 @@ def _compile(
 
     point = jax.ShapeDtypeStruct((n,), dtype)
     data = jax.tree.unflatten(structure, [jax.ShapeDtypeStruct(shape, leaf) for shape, leaf in types])
-    equalities = sum(
-        int(np.prod(jax.eval_shape(lambda x, data, f=f: functions.call(f, x, data), point, data).shape))
-        for f in functions.equality
-    )
+    equalities = sum(array.size for part in parts for array in jax.eval_shape(part, point, data)[1])
     lowered = [lower(values, blocks[0]), lower(derivatives, blocks[1])]
     # tracing holds Python's lock, compiling does not
     with ThreadPoolExecutor(2) as pool:

@@ -102,6 +102,40 @@ def optimise(
         ValueError: naming the argument, its value and the rule, for bounds the wrong way round, a start outside,
             wrong shapes, a cost that is not a real scalar or constraints that are not real vectors.
     """
+    functions = Functions(cost, _several(equality), _several(inequality), data is not None)
+    return _run(functions, starts, lower, upper, data, scale, tolerance, slope_tolerance, max_steps, progress)
+
+
+def optimise_together(
+    function: Function,
+    starts: ArrayLike,
+    *,
+    lower: ArrayLike,
+    upper: ArrayLike,
+    data: Any = None,
+    scale: ArrayLike | None = None,
+    tolerance: float = 1e-8,
+    slope_tolerance: float = 1e-6,
+    max_steps: int = 200,
+    progress: str | None = None,
+) -> Solution:
+    """As `optimise`, of one `function` to (cost, equality, inequality), for these share most of their work."""
+    functions = Functions(None, (), (), data is not None, function)
+    return _run(functions, starts, lower, upper, data, scale, tolerance, slope_tolerance, max_steps, progress)
+
+
+def _run(
+    functions: Functions,
+    starts: ArrayLike,
+    lower: ArrayLike,
+    upper: ArrayLike,
+    data: Any,
+    scale: ArrayLike | None,
+    tolerance: float,
+    slope_tolerance: float,
+    max_steps: int,
+    progress: str | None,
+) -> Solution:
     x, box = check_starts(starts, lower, upper, scale, data)
     check_tolerances(tolerance=tolerance, slope_tolerance=slope_tolerance)
     checks.whole("max_steps", max_steps)
@@ -109,9 +143,8 @@ def optimise(
         warnings.warn(
             f"`tolerance` is {tolerance:g}, which single precision seldom meets: switch double precision on by "
             'jax.config.update("jax_enable_x64", True), or ask for 1e-5.',
-            stacklevel=2,
+            stacklevel=3,
         )
-    functions = Functions(cost, _several(equality), _several(inequality), data is not None)
     programs = Programs(functions, x, data)
     problem = Problem(
         programs=programs,

@@ -83,6 +83,8 @@ def test_smooth_loops_are_inside_between_their_samples():
 class Fixed:
     """An outcome with a given rotation."""
 
+    robot = PROTOTYPE
+
     def __init__(self, rotation, path=None, values=None):
         self.rotation, self.path, self.values = jnp.asarray(rotation), path, values
 
@@ -170,6 +172,10 @@ def test_edits_leave_possible_bodies(name, factor):
 def test_what_the_edits_change():
     """Scaling length and mass as by similarity changes no rotation; inertia about the joint becomes what is asked."""
     np.testing.assert_allclose(about_joint(EDITS["joint inertia"](TREE, 3.0), 0), 3 * about_joint(TREE, 0), rtol=1e-12)
+    by_name = design.with_mass(TREE, TREE.link_names[1], 3.0), design.with_joint_inertia(TREE, TREE.joint_names[0], 2.0)
+    by_number = design.with_mass(TREE, 1, 3.0), design.with_joint_inertia(TREE, 0, 2.0)
+    for ours, theirs in zip(by_name, by_number, strict=True):
+        np.testing.assert_array_equal(ours.inertia, theirs.inertia)
     robot = TREE
     for link in range(robot.links):
         robot = design.with_mass(design.with_length(robot, link, 2.0), link, 5 * robot.mass[link])
@@ -284,13 +290,16 @@ def test_unreachable_roll_says_by_how_much():
         (lambda: design.fourier_loops(ROBOT, 0), "`degree` is 0"),
         (lambda: design.fourier_loops(ROBOT, 2, start=[2.0, 0, 0]), r"start\[0\] is 2"),
         (lambda: design.spline_loops(ROBOT, 3), "`points` is 3"),
-        (lambda: design.turned_to(np.eye(3) * 2), "rotation matrix"),
+        (lambda: design.turned_to(np.eye(3) * 2), "`target` is no rotation"),
+        (lambda: design.turned_about([0, np.nan, 1], 1.0), "`axis`|axis"),
+        (lambda: design.turned_about([0, 0, 1], np.nan), "`angle` is nan"),
         (lambda: design.turned_about([0, 0, 0], 1.0), "`axis` is zero"),
         (lambda: design.off_axis_within([0, 0, 1], 0.0), "`angle` is 0"),
         (lambda: design.with_mass(TREE, 9, 1.0), "`link` is 9"),
         (lambda: design.with_mass(TREE, 1, -1.0), "`mass` is -1"),
         (lambda: design.with_length(TREE, 1, 2.0, along=[0, 0, 0]), "`along`"),
         (lambda: design.with_joint_inertia(TREE, 3, 1.0), "`joint` is 3"),
+        (lambda: design.with_mass(TREE, "foot", 1.0), "`link` is 'foot'; it must be a link of the robot"),
         (lambda: design.with_com_offset(TREE, 1, [1.0, 2.0]), r"`offset` has shape \(2,\)"),
     ],
 )

@@ -5,6 +5,7 @@ import pytest
 
 import reojax
 from reojax import RE_MAX_17, so3
+from reojax.optimisation.status import Status
 
 PROTOTYPE = reojax.robots.prototype()
 A = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
@@ -20,6 +21,8 @@ def padded(trajectory, pieces=12):
 def check(found, target):
     """Of a motion run by other means: its net rotation, motors, joints, ends."""
     assert found.converged
+    assert found.status == Status.CONVERGED
+    assert found.message == "converged"
     assert found.error < 1e-9
     assert found.beyond == 0
     motion = reojax.simulate(PROTOTYPE, padded(found.trajectory), motors=RE_MAX_17, samples=64)
@@ -49,8 +52,35 @@ def test_the_fastest_loop_with_a_rotation_of_its_own():
 
 @pytest.mark.parametrize("target", [np.zeros((3, 3)), np.eye(2), np.diag([1.0, 1.0, -1.0])])
 def test_a_target_that_is_no_rotation(target):
-    with pytest.raises(ValueError, match="`target` is .*; it must be a rotation matrix"):
+    with pytest.raises(ValueError, match="`target` (is no rotation|has shape)"):
         reojax.fastest_loop(PROTOTYPE, target, RE_MAX_17, A)
+
+
+STILL = reojax.polygon(np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: reojax.overlap(PROTOTYPE, A, RE_MAX_17, "trapezium"), "no time law named 'trapezium'.*trapezoid"),
+        (lambda: reojax.overlap(PROTOTYPE, A, RE_MAX_17, 3.0), "`law` is 3.0"),
+        (lambda: reojax.overlap(PROTOTYPE, STILL, RE_MAX_17), "`path` stays where it is"),
+        (lambda: reojax.free_law(PROTOTYPE, STILL, RE_MAX_17), "`path` stays where it is"),
+        (lambda: reojax.free_law(PROTOTYPE, A, RE_MAX_17, points=0.5), "`points` is 0.5"),
+        (lambda: reojax.free_law(PROTOTYPE, A, RE_MAX_17, points=0), "`points` is 0"),
+        (lambda: reojax.fastest_loop(PROTOTYPE, np.eye(3), RE_MAX_17, A, knots=1), "`knots` is 1"),
+        (lambda: reojax.fastest_loop(PROTOTYPE, np.eye(3), RE_MAX_17, A, starts=0), "`starts` is 0"),
+        (lambda: reojax.fastest_loop(PROTOTYPE, np.eye(3), RE_MAX_17, STILL), "`near` stays where it is"),
+        (
+            lambda: reojax.fastest_loop(PROTOTYPE, np.eye(3), RE_MAX_17, reojax.polygon(A.waypoints[:3])),
+            "`near` does not end where it begins",
+        ),
+        (lambda: reojax.overlap(PROTOTYPE, np.zeros((2, 3)), RE_MAX_17), "`path` is a ndarray"),
+    ],
+)
+def test_bad_input_is_named(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
 
 
 def test_motors_and_paths_are_checked():
