@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 Array = jax.Array | np.ndarray
+_RULE = "reojax computes in float32 or float64: convert them, as in `np.asarray(x, np.float64)`"
 
 
 def common_float(*trees: Any) -> np.dtype:
@@ -19,6 +20,9 @@ def common_float(*trees: Any) -> np.dtype:
     """
     dtypes = {jnp.result_type(leaf) for leaf in jax.tree.leaves(trees)}
     floats = [jax.dtypes.canonicalize_dtype(d) for d in dtypes if jnp.issubdtype(d, jnp.floating)]
+    for dtype in floats:
+        if dtype not in (np.float32, np.float64):
+            raise ValueError(f"there are numbers of type {dtype}; {_RULE}.")
     return min(floats, key=lambda d: d.itemsize, default=jax.dtypes.canonicalize_dtype(float))
 
 
@@ -31,15 +35,36 @@ def as_numbers(entry: str, value: Any) -> Array:
     """Return `value` as an array of real numbers (integers become floats), traced or not.
 
     Raises:
-        ValueError: naming `entry`, if it is anything else.
+        ValueError: naming `entry`, if it is anything else: truth values, times, numbers with units, masked entries, or
+            floats that are neither float32 nor float64.
     """
-    on_device = any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves(value))
+    leaves = jax.tree.leaves(value)
+    if any(isinstance(leaf, np.ma.MaskedArray) and np.ma.getmaskarray(leaf).any() for leaf in leaves):
+        raise ValueError(f"`{entry}` has masked entries, which would count; leave them out, or fill them.")
+    if hasattr(value, "units") and hasattr(value, "magnitude"):
+        raise ValueError(f"`{entry}` is {_short(value)}, with units of its own; give its number in SI units.")
+    on_device = any(isinstance(leaf, jax.Array) for leaf in leaves)
     try:
         array = jnp.asarray(value) if on_device else np.asarray(value)
-    except (TypeError, ValueError) as error:  # a ragged list, or no numbers
-        raise ValueError(f"`{entry}` is {value!r}; only real numbers will do.") from error
-    if jnp.issubdtype(array.dtype, jnp.integer):
-        array = array.astype(float)
+    except Exception as error:  # a ragged list, no numbers, or an object that does not turn into an array
+        raise ValueError(f"`{entry}` is {_short(value)}; only real numbers will do.") from error
+    if array.dtype.kind in "iu":
+        return array.astype(float)
+    if array.dtype.kind in "mM":
+        raise ValueError(f"`{entry}` is {_short(value)}, a time of its own kind; give a number of seconds.")
     if not jnp.issubdtype(array.dtype, jnp.floating):
-        raise ValueError(f"`{entry}` is {value!r}; only real numbers will do.")
+        raise ValueError(f"`{entry}` is {_short(value)}; only real numbers will do.")
+    if array.dtype not in (np.float32, np.float64):
+        raise ValueError(f"`{entry}` is of type {array.dtype}; {_RULE}.")
     return array
+
+
+def _short(value: Any) -> str:
+    """`repr`, cut where it is long."""
+    if isinstance(value, str | bytes):
+        value = value[:200]
+    try:
+        text = repr(value)
+    except Exception:
+        text = f"a {type(value).__name__}"
+    return text if len(text) <= 200 else f"{text[:150]} ... {text[-40:]}"
