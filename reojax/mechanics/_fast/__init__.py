@@ -5,16 +5,17 @@ a contiguous array, a whole evaluation of omega becomes one vectorised loop, and
 are left. So vectors here are triples of scalars, and an evaluation is written for one scalar shape, all
 quadrature nodes of the path. Files, in the order of use:
 
-    scalar      arithmetic that leaves out zeros known beforehand, vectors as triples
-    components  a robot's arrays as scalars, with the zeros and ones that are known
-    sincos      a sine and cosine that vectorise
-    store       values computed once, side by side, for many readers
-    nodes       joint angles and rates at the quadrature nodes of a path, and sums over nodes
-    omega       angular velocity of the base at all nodes (thesis eq. 2.14)
-    steps       omega at the nodes of a step to the rotation over the step
-    product     the ordered product of the steps' rotations
-    endpoint    all of it in a row, and its derivative, which needs
-    momentum    the angular momentum with everything moving, for forward mode,
-    virtual     its derivative in closed form, for reverse mode, and
-    blocks      batches of designs in blocks that stay in the cache
+    scalar        arithmetic that leaves out zeros known beforehand; vectors and matrices of scalars
+    parameters    a robot's arrays as scalars, with the zeros and frame axes that are known
+    sincos        a sine and cosine that vectorise
+    materialize   values computed once, side by side, for many readers
+    nodes         joint angles and rates at the quadrature nodes of a path, and sums over nodes
+    recursion     inertia and momentum from the tips to the base: angular velocity at all nodes (thesis eq. 2.14)
+    magnus        omega at the nodes of a step to the rotation over the step
+    quaternions   the ordered product of the steps' rotations
+    net_rotation  all of it in a row, and its derivative, which needs
+    momentum_jvp  the angular momentum with everything moving, for forward mode, and
+    momentum_vjp  its derivative in closed form, for reverse mode
+    rolled        the passes over the tree as loops over joints: short to compile, for long robots
+    blocking      batches of designs in blocks that stay in the cache
 """

@@ -38,6 +38,8 @@ class Call(NamedTuple):
     """Of the results, for one design."""
     nodes: int
     """Elements of a typical intermediate value of one design; times as many, where many values are alive at once."""
+    short: tuple[Any, int] | None = None
+    """Another `static` that makes a program which is shorter to compile, and the most designs for which it serves."""
     transpose: Callable[..., Sequence[jax.Array]] | None = None
     """The same arguments with cotangents of the results in the place of the last `linear` ones, to theirs."""
     linear: int = 0
@@ -58,6 +60,8 @@ def _whole(*args, call: Call, batched: tuple[bool, ...], size: int | None) -> li
 
 
 def _block_by_block(*args, call: Call, batched: tuple[bool, ...], size: int | None) -> list[jax.Array]:
+    if call.short and (size or 1) <= call.short[1]:
+        return _one_by_one(*args, call=call._replace(static=call.short[0]), batched=batched, size=size)
     block = max(1, _BYTES // (call.nodes * args[0].dtype.itemsize))
     if size is None or size < 2 * block:
         return _whole(*args, call=call, batched=batched, size=size)
@@ -76,6 +80,18 @@ def _block_by_block(*args, call: Call, batched: tuple[bool, ...], size: int | No
 
     found = jax.lax.map(of_block, [x.reshape(rounds, block, *x.shape[1:]) for x in many])
     return [x.reshape(-1, *x.shape[2:])[:size] for x in found]
+
+
+def _one_by_one(*args, call: Call, batched: tuple[bool, ...], size: int | None) -> list[jax.Array]:
+    if size is None:
+        return _whole(*args, call=call, batched=batched, size=None)
+
+    def of_design(design):
+        values = iter(design)
+        part = [next(values) if b else x for x, b in zip(args, batched, strict=True)]
+        return _whole(*part, call=call, batched=(False,) * len(part), size=None)
+
+    return jax.lax.map(of_design, [x for x, b in zip(args, batched, strict=True) if b])
 
 
 def _shapes(*avals, call: Call, batched: tuple[bool, ...], size: int | None) -> list[Any]:
@@ -133,6 +149,7 @@ def _transpose(cotangents, *args, call: Call, batched: tuple[bool, ...], size: i
         static=call.static,
         shapes=tuple(x.aval.shape[b:] for x, b in zip(linear, batched[-call.linear :], strict=True)),
         nodes=call.nodes,
+        short=call.short,
         transpose=call.function,
         linear=len(given),
     )

@@ -27,8 +27,8 @@ import numpy as np
 
 from reojax.mechanics._fast.materialize import materialize
 from reojax.mechanics._fast.nodes import LEGENDRE, NODES, WEIGHTS, per_step
-from reojax.mechanics._fast.quaternions import Quaternion, Triple, times
-from reojax.mechanics._fast.scalar import cross, dot, mul, plus, times as scale
+from reojax.mechanics._fast.quaternions import Quaternion, Triple, multiply
+from reojax.mechanics._fast.scalar import cross, dot, mul, plus, scaled
 from reojax.mechanics._fast.sincos import horner, sincos
 
 _MOMENTS = WEIGHTS[:, None] * LEGENDRE
@@ -59,7 +59,7 @@ _SERIES_END = 10.0
 """Angles within a step stay below this root (180 degrees) or the step is too long for eight nodes anyway."""
 
 
-def _at_nodes(values: Triple, matrix: np.ndarray) -> Triple:
+def _spread(values: Triple, matrix: np.ndarray) -> Triple:
     x, y, z = (per_step(v, matrix).reshape(-1) for v in values)
     return x, y, z
 
@@ -90,20 +90,20 @@ def step_rotations(omega: Triple) -> Step:
         omega: angular velocity times the step's duration at the nodes of all steps, three arrays (steps * 8,).
     """
     s = jnp.asarray(np.tile(NODES - 0.5, omega[0].shape[0] // len(NODES)), omega[0].dtype)
-    mean = _at_nodes(omega, _MEAN_AT_NODES)
-    u = materialize(_rotate(scale(s, mean), plus(omega, scale(-1, mean))))
-    turned = _at_nodes(u, _INTEGRAL)
+    mean = _spread(omega, _MEAN_AT_NODES)
+    u = materialize(_rotate(scaled(s, mean), plus(omega, scaled(-1, mean))))
+    turned = _spread(u, _INTEGRAL)
     v = materialize(_fer(u, turned))
     m = _moments(v, _USED)
     first = m[0]
     for a, b in pairwise(m):
-        first = plus(first, scale(0.5, cross(a, b)))
-    half = materialize(_exp(scale(0.5, _moments(omega, 1)[0])))
-    inner = materialize(times(_exp_small(first), _exp_small(_moments(u, 1)[0])))
-    rotation = materialize(times(times(half, inner), half))
+        first = plus(first, scaled(0.5, cross(a, b)))
+    half = materialize(_exp(scaled(0.5, _moments(omega, 1)[0])))
+    inner = materialize(multiply(_exp_small(first), _exp_small(_moments(u, 1)[0])))
+    rotation = materialize(multiply(multiply(half, inner), half))
 
     def turns() -> tuple[Triple, ...]:
-        return scale(s, mean), turned, _at_nodes(v, _INTEGRAL)
+        return scaled(s, mean), turned, _spread(v, _INTEGRAL)
 
     def inside(vectors: Triple) -> Triple:
         for turn in turns():
@@ -111,9 +111,9 @@ def step_rotations(omega: Triple) -> Step:
         return vectors
 
     def back(vectors: Triple) -> Triple:
-        vectors = materialize(_at_nodes(vectors, _SHARES))
+        vectors = materialize(_spread(vectors, _SHARES))
         for turn in reversed(turns()):
-            vectors = _rotate(scale(-1, turn), vectors)
+            vectors = _rotate(scaled(-1, turn), vectors)
         return materialize(vectors)
 
     return Step(rotation, half, inside, back)
@@ -128,19 +128,19 @@ def _rotate(by: Triple, vectors: Triple) -> Triple:
     """Turn vectors by rotation vectors below a half turn: `v + sinc b x v + cosc b x (b x v)`, by power series."""
     square = jnp.minimum(dot(by, by), _SERIES_END)
     p = cross(by, vectors)
-    return plus(vectors, plus(scale(horner(_SIN1, square), p), scale(horner(_COS2, square), cross(by, p))))
+    return plus(vectors, plus(scaled(horner(_SIN1, square), p), scaled(horner(_COS2, square), cross(by, p))))
 
 
 def _fer(u: Triple, turned: Triple) -> Triple:
     square = jnp.minimum(dot(turned, turned), _SERIES_END)
     p = cross(turned, u)
-    return plus(scale(horner(_FER_1, square), p), scale(horner(_FER_2, square), cross(turned, p)))
+    return plus(scaled(horner(_FER_1, square), p), scaled(horner(_FER_2, square), cross(turned, p)))
 
 
 def _exp_small(vector: Triple) -> Quaternion:
     """Quaternion of a rotation vector below a turn, by power series."""
     square = jnp.minimum(0.25 * dot(vector, vector), _SERIES_END)
-    return horner(_COS0, square), *scale(mul(0.5, horner(_SIN1, square)), vector)
+    return horner(_COS0, square), *scaled(mul(0.5, horner(_SIN1, square)), vector)
 
 
 def _exp(vector: Triple) -> Quaternion:
@@ -151,4 +151,4 @@ def _exp(vector: Triple) -> Quaternion:
     s, c = sincos(angle)
     near = jnp.where(small, square, 0.0)
     k = 0.5 * jnp.where(small, horner(_SIN1[:4], near), s / angle)
-    return jnp.where(small, horner(_COS0[:4], near), c), *scale(k, vector)
+    return jnp.where(small, horner(_COS0[:4], near), c), *scaled(k, vector)

@@ -1,6 +1,6 @@
 """The robot's angular momentum with everything moving, for its derivative at fixed motion of the base (forward mode).
 
-`virtual` has the same derivative for reverse mode.
+`momentum_vjp` has the same derivative for reverse mode.
 """
 
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from reojax.mechanics._fast.materialize import materialize
 from reojax.mechanics._fast.parameters import RobotScalars
 from reojax.mechanics._fast.recursion import apply_symmetric, joint_rotation
-from reojax.mechanics._fast.scalar import Matrix, Scalar, Symmetric, Vector, apply, cross, mul, plus, times, transpose
+from reojax.mechanics._fast.scalar import Matrix, Scalar, Symmetric, Vector, apply, cross, mul, plus, scaled, transpose
 
 Pair = tuple[Vector, Vector]
 """Angular velocity and velocity of the origin; or linear and angular momentum about the origin."""
@@ -26,22 +26,22 @@ def angular_momentum(
 
     Outward, each link's angular velocity `w` and its origin's velocity `v`, in its own frame:
     `w' = E^T w + rate e`, `v' = E^T (v + w x a)`. There, momentum `p = m v + w x f`, `h = J w + f x v`. Inward,
-    `p + E p'`, `h + E h' + a x E p'`, and the rotors. Values are kept link by link (`store`).
+    `p + E p'`, `h + E h' + a x E p'`, and the rotors. Values are kept link by link (`materialize`).
     """
     joints = range(len(robot.parent))
     E = [joint_rotation(e, *sc) for e, sc in zip(robot.axis, sine_cosine, strict=True)]
     motion: list[Pair] = [(omega, velocity)]
     for k in joints:
         w, v = outward(E[k], robot.anchor[k], motion[robot.parent[k]])
-        motion.append(kept((plus(w, times(rate[k], robot.axis[k])), v)))
+        motion.append(kept((plus(w, scaled(rate[k], robot.axis[k])), v)))
     bodies = zip(robot.mass, robot.moment, robot.inertia, motion, strict=True)
     momentum = [body_momentum(m, f, J, *of_link) for m, f, J, of_link in bodies]
     for k in reversed(joints):
         parent = robot.parent[k]
-        rotor = times(mul(rate[k], robot.rotor_momentum[k]), robot.axis[k])
+        rotor = scaled(mul(rate[k], robot.rotor_momentum[k]), robot.axis[k])
         momentum[parent] = onto_parent(E[k], robot.anchor[k], momentum[parent], kept(momentum[k + 1]), rotor)
     p, h = momentum[0]
-    return plus(h, times(-1, cross(centre, p)))
+    return plus(h, scaled(-1, cross(centre, p)))
 
 
 def kept(pair: Pair) -> Pair:
@@ -59,7 +59,7 @@ def outward(E: Matrix, anchor: Vector, motion: Pair) -> Pair:
 
 def body_momentum(m: Scalar, f: Vector, J: Symmetric, w: Vector, v: Vector) -> Pair:
     """Return the momentum of one link alone."""
-    return plus(times(m, v), cross(w, f)), plus(apply_symmetric(J, w), cross(f, v))
+    return plus(scaled(m, v), cross(w, f)), plus(apply_symmetric(J, w), cross(f, v))
 
 
 def onto_parent(E: Matrix, anchor: Vector, own: Pair, beyond: Pair, rotor: Vector) -> Pair:

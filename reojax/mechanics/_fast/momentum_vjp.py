@@ -26,6 +26,7 @@ from reojax.mechanics._fast.momentum_jvp import Pair, body_momentum, kept, onto_
 from reojax.mechanics._fast.parameters import RobotScalars
 from reojax.mechanics._fast.recursion import joint_rotation
 from reojax.mechanics._fast.scalar import (
+    Matrix,
     Scalar,
     Symmetric,
     Vector,
@@ -35,8 +36,8 @@ from reojax.mechanics._fast.scalar import (
     dot,
     mul,
     plus,
+    scaled,
     sub,
-    times,
 )
 
 
@@ -58,7 +59,7 @@ def slopes(
     centre: Vector,
     mu: Vector,
 ) -> Slopes:
-    """Differentiate `mu . angular_momentum(...)` (`momentum`) at fixed `mu`, `omega`, `velocity` and `centre`."""
+    """Differentiate `mu . angular_momentum(...)` (`momentum_jvp`) at fixed `mu`, `omega`, `velocity` and `centre`."""
     joints = range(len(robot.parent))
     E = [joint_rotation(e, *sc) for e, sc in zip(robot.axis, sine_cosine, strict=True)]
     actual: list[Pair] = [(omega, velocity)]
@@ -66,50 +67,99 @@ def slopes(
     for k in joints:
         parent, anchor = robot.parent[k], robot.anchor[k]
         w, v = outward(E[k], anchor, actual[parent])
-        actual.append(kept((plus(w, times(rate[k], robot.axis[k])), v)))
+        actual.append(kept((plus(w, scaled(rate[k], robot.axis[k])), v)))
         virtual.append(kept(outward(E[k], anchor, virtual[parent])))
     bodies = list(zip(robot.mass, robot.moment, robot.inertia, strict=True))
     momentum = [body_momentum(*body, *motion) for body, motion in zip(bodies, actual, strict=True)]
     likewise = [body_momentum(*body, *motion) for body, motion in zip(bodies, virtual, strict=True)]
-    turning: list[Vector] = [()] * len(joints)
-    pull: list[Vector] = [()] * len(joints)
+    of_joints: list[Any] = [None] * len(joints)
     for k in reversed(joints):
         link, parent, e = k + 1, robot.parent[k], robot.axis[k]
-        (p, h), (p_, h_) = momentum[link], likewise[link] = kept(momentum[link]), kept(likewise[link])
-        (w, v), (w_, v_) = actual[link], virtual[link]
-        u = plus(w, times(mul(-1, rate[k]), e))
-        turning[k] = plus(plus(cross(h_, u), cross(p_, v)), plus(cross(h, w_), cross(p, v_)))
-        if not all(isinstance(c, int) for c in e):  # or else only one of the three is needed
-            turning[k] = materialize(turning[k])
-        pull[k] = plus(cross(p_, u), cross(p, w_))
-        rotor = times(mul(rate[k], robot.rotor_momentum[k]), e)
+        momentum[link], likewise[link] = kept(momentum[link]), kept(likewise[link])
+        of_joints[k] = joint_slopes(
+            E[k], e, sine_cosine[k], rate[k], robot.rotor_momentum[k],
+            momentum[link], likewise[link], actual[link], virtual[link], virtual[parent][0],
+        )  # fmt: skip
+        rotor = scaled(mul(rate[k], robot.rotor_momentum[k]), e)
         momentum[parent] = onto_parent(E[k], robot.anchor[k], momentum[parent], momentum[link], rotor)
         likewise[parent] = onto_parent(E[k], robot.anchor[k], likewise[parent], likewise[link], (0, 0, 0))
-
-    along = [dot(e, virtual[k + 1][0]) for k, e in zip(joints, robot.axis, strict=True)]
-    beyond = [likewise[k + 1][1] for k in joints]
-    by_axis = []
-    for k in joints:
-        (s, c), e, g = sine_cosine[k], robot.axis[k], turning[k]
-        turned = plus(times(s, g), times(sub(c, 1), cross(g, e)))
-        moved = plus(beyond[k], times(robot.rotor_momentum[k], virtual[robot.parent[k]][0]))
-        by_axis.append(plus(turned, times(rate[k], moved)))
-    motions = list(zip(actual, virtual, strict=True))
+    of_links = [body_slopes(*motions) for motions in zip(actual, virtual, strict=True)]
     return Slopes(
         robot=RobotScalars(
-            mass=[dot(v, v_) for (_, v), (_, v_) in motions],
-            moment=[plus(cross(v, w_), cross(v_, w)) for (w, v), (w_, v_) in motions],
-            inertia=[_products(w, w_) for (w, _), (w_, _) in motions],
-            axis=by_axis,
-            anchor=[apply(E[k], pull[k]) for k in joints],
-            rotor_momentum=[mul(rate[k], along[k]) for k in joints],
+            mass=[of.mass for of in of_links],
+            moment=[of.moment for of in of_links],
+            inertia=[of.inertia for of in of_links],
+            axis=[of.axis for of in of_joints],
+            anchor=[of.anchor for of in of_joints],
+            rotor_momentum=[of.rotor_momentum for of in of_joints],
             parent=robot.parent,
         ),
-        theta=[dot(e, g) for e, g in zip(robot.axis, turning, strict=True)],
-        rate=[
-            add(dot(e, h), mul(spin, a))
-            for e, h, spin, a in zip(robot.axis, beyond, robot.rotor_momentum, along, strict=True)
-        ],
+        theta=[of.theta for of in of_joints],
+        rate=[of.rate for of in of_joints],
+    )
+
+
+class BodySlopes(NamedTuple):
+    """Derivatives of `mu . L` by what one link is."""
+
+    mass: Scalar
+    moment: Vector
+    inertia: Symmetric
+
+
+def body_slopes(motion: Pair, virtual: Pair) -> BodySlopes:
+    """Read off the pairing of the two motions of a link."""
+    (w, v), (w_, v_) = motion, virtual
+    mixed = tuple(add(mul(w[i], w_[j]), mul(w[j], w_[i])) for i, j in ((0, 1), (0, 2), (1, 2)))
+    return BodySlopes(
+        mass=dot(v, v_),
+        moment=plus(cross(v, w_), cross(v_, w)),
+        inertia=(*(mul(x, y) for x, y in zip(w, w_, strict=True)), *mixed),
+    )
+
+
+class JointSlopes(NamedTuple):
+    """Derivatives of `mu . L` by what one joint is and does."""
+
+    theta: Scalar
+    rate: Scalar
+    axis: Vector
+    anchor: Vector
+    rotor_momentum: Scalar
+
+
+def joint_slopes(
+    E: Matrix,
+    e: Vector,
+    sine_cosine: tuple[Scalar, Scalar],
+    rate: Scalar,
+    rotor: Scalar,
+    momentum: Pair,
+    momentum_: Pair,
+    motion: Pair,
+    virtual: Pair,
+    virtual_before: Vector,
+) -> JointSlopes:
+    """Of one joint, from both momenta of all beyond it and both motions of its link, in the link's frame.
+
+    `virtual_before` is the virtual angular velocity of the link before, which carries the joint's rotor.
+    """
+    (p, h), (p_, h_), (w, v), (w_, v_), (s, c) = momentum, momentum_, motion, virtual, sine_cosine
+    u = plus(w, scaled(mul(-1, rate), e))
+    # a turn of all beyond the joint, about any axis
+    turning = plus(plus(cross(h_, u), cross(p_, v)), plus(cross(h, w_), cross(p, v_)))
+    if not all(isinstance(x, int) for x in e):  # or else only one of the three is needed
+        turning = materialize(turning)
+    # a change of the unit axis: the turn that it makes at this angle, and the rate's and the rotor's direction
+    turned = plus(scaled(s, turning), scaled(sub(c, 1), cross(turning, e)))
+    moved = plus(h_, scaled(rotor, virtual_before))
+    along = dot(e, w_)
+    return JointSlopes(
+        theta=dot(e, turning),
+        rate=add(dot(e, h_), mul(rotor, along)),
+        axis=plus(turned, scaled(rate, moved)),
+        anchor=apply(E, plus(cross(p_, u), cross(p, w_))),
+        rotor_momentum=mul(rate, along),
     )
 
 
@@ -126,8 +176,3 @@ def fusion_groups(robot: RobotScalars) -> Any:
         parent=robot.parent,
     )
     return RobotScalars(**names)
-
-
-def _products(a: Vector, b: Vector) -> Symmetric:
-    mixed = tuple(add(mul(a[i], b[j]), mul(a[j], b[i])) for i, j in ((0, 1), (0, 2), (1, 2)))
-    return (*(mul(x, y) for x, y in zip(a, b, strict=True)), *mixed)

@@ -5,11 +5,11 @@ the end by `R(s) d omega(s)` seen from the start, so `dR R^T = hat(integral of R
 `L(theta, theta_dot, omega) = 0` along the path, `d omega = -A^-1 dL` with `dL` the change of the angular momentum
 at a fixed motion of the base: nothing of the inverse has to be differentiated. The linear momentum of that fixed
 motion being zero, its reference point and velocity may stay fixed too (their first-order effects cancel).
-The sum uses the nodes and values of the solution itself. Forward mode (`_push`) takes `dL` from `momentum`.
+The sum uses the nodes and values of the solution itself. Forward mode (`_push`) takes `dL` from `momentum_jvp`.
 Reverse mode (`_pull`) is the transpose: one constant vector `l` turned into each node's frame, `mu = -A^-1 R^T l`, and
-the derivative of `mu . L` in closed form (`virtual`). Both compute the values at the nodes again, block by block
-(`blocks`): keeping them from the first pass would take as long, and memory for all designs. What they are by are the
-`Parameters` of `components`; from there to the arrays of a robot JAX differentiates as usual.
+the derivative of `mu . L` in closed form (`momentum_vjp`). Both compute the values at the nodes again, block by block
+(`blocking`): keeping them from the first pass would take as long, and memory for all designs. What they are by are the
+`Parameters` of `parameters`; from there to the arrays of a robot JAX differentiates as usual.
 """
 
 from collections.abc import Sequence
@@ -18,8 +18,10 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
+from reojax.mechanics._fast import rolled
 from reojax.mechanics._fast.blocking import Call, in_blocks
 from reojax.mechanics._fast.magnus import Step, mean_over_step, step_rotations
 from reojax.mechanics._fast.materialize import materialize
@@ -40,18 +42,27 @@ from reojax.mechanics._fast.parameters import (
 from reojax.mechanics._fast.quaternions import (
     Quaternion,
     Triple,
-    conjugate,
+    inverse,
+    multiply,
     product,
     products_up_to,
     rotate,
     shift,
-    times,
     to_matrix,
 )
-from reojax.mechanics._fast.recursion import AT_ONCE, inward, solve
-from reojax.mechanics._fast.scalar import Symmetric, Vector, cross, plus, times as scale
+from reojax.mechanics._fast.recursion import AT_ONCE, Base, inward, solve
+from reojax.mechanics._fast.scalar import Symmetric, Vector, cross, plus, scaled
 from reojax.mechanics._fast.sincos import sincos
 from reojax.robot import Robot
+
+ROLLED_ALONE, ROLLED_IN_BATCHES = 6, 12
+"""Joints beyond which the passes over the tree are loops over joints (`rolled`), for one design and for few designs.
+
+Such a program is compiled in a few seconds whatever the number of joints, and runs as fast for one design; for many it
+takes four to eight times as long as one in which every joint has code of its own.
+"""
+_FEW = 64
+"""Designs that are few."""
 
 
 class RotationProblem(NamedTuple):
@@ -64,6 +75,14 @@ class RotationProblem(NamedTuple):
     """Which of the flattened parameters a derivative is by; the known ones among them do not change."""
     moved: bool = False
     """Whether it is by the path too."""
+    rolled: bool = False
+    """Whether the passes over the tree are loops over joints."""
+
+    def short(self) -> tuple["RotationProblem", int] | None:
+        """The problem for a short program, and the designs up to which it is used."""
+        joints = len(self.parent)
+        most = _FEW if joints > ROLLED_IN_BATCHES else 1 if joints > ROLLED_ALONE else 0
+        return (self._replace(rolled=True), most) if most else None
 
     def robot(self, data: Sequence[jax.Array]) -> RobotScalars:
         """Put the known numbers in the place of the data."""
@@ -72,7 +91,8 @@ class RotationProblem(NamedTuple):
 
 def steps_of_path(robot: Robot, pattern: Pattern, points: jax.Array, steps: int) -> Step:
     """Rotation over each of the `steps` steps of each edge, in order."""
-    problem = RotationProblem(steps, robot.parent, known_parameters(pattern))
+    rolled = robot.joints > ROLLED_IN_BATCHES
+    problem = RotationProblem(steps, robot.parent, known_parameters(pattern), rolled=rolled)
     return _steps_of_path(problem, flatten(parameters(robot)), points)
 
 
@@ -85,7 +105,7 @@ def net_rotation(robot: Robot, pattern: Pattern, points: jax.Array, steps: int) 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _end_rotation(problem: RotationProblem, numbers: Parameters, points: jax.Array) -> jax.Array:
     alive = 1 if points.shape[1] <= AT_ONCE else 4
-    call = Call(_rotation, problem, ((3, 3),), alive * _nodes(problem, points))
+    call = Call(_rotation, problem, ((3, 3),), alive * _nodes(problem, points), short=problem.short())
     return in_blocks(call, flatten(numbers), points)[0]
 
 
@@ -103,7 +123,8 @@ def _end_rotation_jvp(problem, primals, tangents):
     if not changes:
         return rotation, jnp.zeros_like(rotation)
     alive = max(4, points.shape[1])
-    call = Call(_push, problem, ((3,),), alive * _nodes(problem, points), transpose=_pull, linear=len(changes))
+    size = alive * _nodes(problem, points)
+    call = Call(_push, problem, ((3,),), size, short=problem.short(), transpose=_pull, linear=len(changes))
     turn = in_blocks(call, flatten(numbers), points, *changes)[0]
     return rotation, jnp.cross(turn[:, None], rotation, axis=0)
 
@@ -118,17 +139,20 @@ def _rotation(problem: RotationProblem, numbers: jax.Array, points: jax.Array) -
 
 
 def _steps_of_path(problem: RotationProblem, numbers: jax.Array, points: jax.Array) -> Step:
-    theta, rate = path_nodes(points, problem.steps)
-    base = inward(problem.robot(split(numbers)), [sincos(a) for a in theta], rate)
-    return step_rotations(materialize(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), theta[0])))
+    if problem.rolled:
+        motion = rolled.motion_at_nodes(points, problem.steps)
+        base = rolled.inward(rolled.unflatten(numbers, len(problem.parent)), problem.parent, motion)
+        like = motion.rate[0]
+    else:
+        theta, rate = path_nodes(points, problem.steps)
+        base = inward(problem.robot(split(numbers)), [sincos(a) for a in theta], rate)
+        like = theta[0]
+    return step_rotations(materialize(_at_nodes(solve(base.inertia, scaled(-1, base.momentum)), like)))
 
 
 class NodeSolution(NamedTuple):
     """What derivatives read of the solution, kept."""
 
-    theta: list[jax.Array]
-    rate: list[jax.Array]
-    sine_cosine: list[Any]
     inertia: Symmetric
     """`A`."""
     centre: Vector
@@ -139,27 +163,52 @@ class NodeSolution(NamedTuple):
     to_step: Quaternion
     """Attitude in which `step.inside` begins, from the start of the path, four arrays (steps,)."""
 
+    def change_of_omega(self, change: Vector) -> Triple:
+        """What a change of the momentum at a fixed motion of the base does to omega: `-A^-1 dL`."""
+        return materialize(_at_nodes(solve(self.inertia, scaled(-1, change)), self.omega[0]))
 
-def _solution(problem: RotationProblem, data: list[jax.Array], points: jax.Array) -> NodeSolution:
+
+def _solution(base: Base, like: jax.Array) -> NodeSolution:
+    moving = materialize((*base.momentum, *base.drift))
+    centre, drift = materialize(base.centre), moving[3:]
+    inertia = materialize(base.inertia)
+    omega = materialize(_at_nodes(solve(inertia, scaled(-1, moving[:3])), like))
+    velocity = materialize(scaled(-1, plus(drift, cross(omega, centre))))
+    step = step_rotations(omega)
+    to_step = materialize(multiply(shift(products_up_to(step.rotation), 1), step.half))
+    return NodeSolution(inertia, centre, omega, velocity, step, to_step)
+
+
+def _unrolled_solution(
+    problem: RotationProblem, data: list[jax.Array], points: jax.Array
+) -> tuple[NodeSolution, list[jax.Array], list[Any]]:
+    """With the joints' rates and the sines and cosines of their angles."""
     theta, rate = path_nodes(points, problem.steps)
     sine_cosine = [materialize(sincos(angle)) for angle in theta]
     robot = problem.robot(data)
     base = inward(robot, sine_cosine, rate, by_joint=not robot.axes_known)
-    moving = materialize((*base.momentum, *base.drift))
-    centre, drift = materialize(base.centre), moving[3:]
-    inertia = materialize(base.inertia)
-    omega = materialize(_at_nodes(solve(inertia, scale(-1, moving[:3])), theta[0]))
-    velocity = materialize(scale(-1, plus(drift, cross(omega, centre))))
-    step = step_rotations(omega)
-    to_step = materialize(times(shift(products_up_to(step.rotation), 1), step.half))
-    return NodeSolution(theta, rate, sine_cosine, inertia, centre, omega, velocity, step, to_step)
+    return _solution(base, theta[0]), rate, sine_cosine
 
 
 def _push(problem: RotationProblem, numbers: jax.Array, points: jax.Array, *changes: jax.Array) -> list[jax.Array]:
     """How the end turns, seen from the start, with changes of the data and of the path."""
+    given = iter(changes)
+    by_data = next(given) if any(problem.varied) else None
+    by_points = next(given) if problem.moved else jnp.zeros_like(points)
+    push = _push_rolled if problem.rolled else _push_unrolled
+    known, change = push(problem, numbers, points, by_data, by_points)
+    in_step = materialize(mean_over_step(known.step.inside(known.change_of_omega(change))))
+    x, y, z = (c.sum() for c in rotate(known.to_step, in_step))
+    return [jnp.stack([x, y, z])]
+
+
+def _push_unrolled(
+    problem: RotationProblem, numbers: jax.Array, points: jax.Array, by_data: Any, by_points: jax.Array
+) -> tuple[NodeSolution, Vector]:
+    """Solution, and the change of the momentum at a fixed motion of the base."""
     data = split(numbers)
-    known = _solution(problem, data, points)
-    like = known.theta[0]
+    known, *_ = _unrolled_solution(problem, data, points)
+    like = known.omega[0]
     places = [i for i, varied in enumerate(problem.varied) if varied]
 
     def momentum(varied, points):
@@ -170,26 +219,49 @@ def _push(problem: RotationProblem, numbers: jax.Array, points: jax.Array, *chan
         fixed = (known.omega, known.velocity, known.centre)
         return _at_nodes(angular_momentum(problem.robot(now), [sincos(a) for a in theta], rate, *fixed), like)
 
-    given = iter(changes)
-    by_data = split(next(given)) if places else []
-    by_points = next(given) if problem.moved else jnp.zeros_like(points)
-    _, change = jax.jvp(momentum, ([data[i] for i in places], points), (by_data, by_points))
-    change_of_omega = materialize(_at_nodes(solve(known.inertia, scale(-1, change)), like))
-    in_step = materialize(mean_over_step(known.step.inside(change_of_omega)))
-    x, y, z = (c.sum() for c in rotate(known.to_step, in_step))
-    return [jnp.stack([x, y, z])]
+    changes = split(by_data) if places else []
+    return known, jax.jvp(momentum, ([data[i] for i in places], points), (changes, by_points))[1]
+
+
+def _push_rolled(
+    problem: RotationProblem, numbers: jax.Array, points: jax.Array, by_data: Any, by_points: jax.Array
+) -> tuple[NodeSolution, Vector]:
+    """The same, in loops over joints."""
+    parent, joints = problem.parent, len(problem.parent)
+    motion = rolled.motion_at_nodes(points, problem.steps)
+    known = _solution(rolled.inward(rolled.unflatten(numbers, joints), parent, motion), motion.rate[0])
+
+    def momentum(numbers, points):
+        robot, motion = rolled.unflatten(numbers, joints), rolled.motion_at_nodes(points, problem.steps)
+        return rolled.angular_momentum(robot, parent, motion, known.omega, known.velocity, known.centre)
+
+    change = jnp.zeros_like(numbers)
+    if by_data is not None:
+        change = change.at[np.flatnonzero(problem.varied)].set(by_data)
+    return known, jax.jvp(momentum, (numbers, points), (change, by_points))[1]
 
 
 def _pull(problem: RotationProblem, numbers: jax.Array, points: jax.Array, by_turn: jax.Array) -> list[jax.Array]:
     """Transpose of `_push`: what the scalar product of `by_turn` with the end's turn changes by."""
+    pull = _pull_rolled if problem.rolled else _pull_unrolled
+    return pull(problem, numbers, points, by_turn)
+
+
+def _virtual_turn(known: NodeSolution, by_turn: jax.Array) -> Triple:
+    """`mu = -A^-1 R^T l` at all nodes."""
+    in_step = materialize(rotate(inverse(known.to_step), tuple(split(by_turn))))
+    return known.change_of_omega(known.step.back(in_step))
+
+
+def _pull_unrolled(
+    problem: RotationProblem, numbers: jax.Array, points: jax.Array, by_turn: jax.Array
+) -> list[jax.Array]:
     data = split(numbers)
     robot = problem.robot(data)
-    known = _solution(problem, data, points)
-    like = known.theta[0]
-    in_step = materialize(rotate(conjugate(known.to_step), tuple(split(by_turn))))
-    by_omega = known.step.back(in_step)
-    mu = materialize(_at_nodes(solve(known.inertia, scale(-1, by_omega)), like))
-    of = slopes(robot, known.sine_cosine, known.rate, known.omega, known.velocity, known.centre, mu)
+    known, rate, sine_cosine = _unrolled_solution(problem, data, points)
+    like = known.omega[0]
+    mu = _virtual_turn(known, by_turn)
+    of = slopes(robot, sine_cosine, rate, known.omega, known.velocity, known.centre, mu)
     found = []
     if any(problem.varied):
         by_entry, loops = jax.tree.leaves(of.robot), jax.tree.leaves(fusion_groups(robot))
@@ -206,6 +278,18 @@ def _pull(problem: RotationProblem, numbers: jax.Array, points: jax.Array, by_tu
         by_theta, by_rate = ([pair[i] for pair in by_nodes] for i in (0, 1))
         found.append(to_points(by_theta, by_rate, problem.steps))
     return found
+
+
+def _pull_rolled(
+    problem: RotationProblem, numbers: jax.Array, points: jax.Array, by_turn: jax.Array
+) -> list[jax.Array]:
+    parent = problem.parent
+    robot, motion = rolled.unflatten(numbers, len(parent)), rolled.motion_at_nodes(points, problem.steps)
+    known = _solution(rolled.inward(robot, parent, motion), motion.rate[0])
+    mu = _virtual_turn(known, by_turn)
+    of = rolled.slopes(robot, parent, motion, known.omega, known.velocity, known.centre, mu)
+    found = [flatten(of.robot)[np.flatnonzero(problem.varied)]] if any(problem.varied) else []
+    return found + ([rolled.to_points(of.theta, of.rate, problem.steps)] if problem.moved else [])
 
 
 def _at_nodes(vector, like: jax.Array) -> Triple:

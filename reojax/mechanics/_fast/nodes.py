@@ -6,6 +6,7 @@ plain reductions are short and slow.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -70,7 +71,7 @@ def _to_nodes_jvp(primals, tangents):
     return to_nodes(value, like), change.reshape(-1)
 
 
-def sum_over_nodes(values: Sequence[jax.Array]) -> Sequence[jax.Array]:
+def sum_over_nodes(values: Sequence[Any]) -> Sequence[jax.Array]:
     """Sum each of several arrays of nodes, in one loop."""
     if len(values) == 1:
         ones = jnp.ones((values[0].shape[0], 1), values[0].dtype)

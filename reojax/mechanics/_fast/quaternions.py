@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from reojax.mechanics._fast.materialize import materialize
-from reojax.mechanics._fast.scalar import cross, dot, mul, plus, sub, times as scale
+from reojax.mechanics._fast.scalar import cross, dot, mul, plus, scaled, sub
 
 Quaternion = tuple[jax.Array, ...]
 """w, x, y, z."""
@@ -12,20 +12,20 @@ Triple = tuple[jax.Array, ...]
 """x, y, z."""
 
 
-def times(a: Quaternion, b: Quaternion) -> Quaternion:
+def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     """Return the quaternion of the rotation `a b`: in the frame that `a` made, do `b`."""
     s, u, t, v = a[0], a[1:], b[0], b[1:]
-    return sub(mul(s, t), dot(u, v)), *plus(plus(scale(s, v), scale(t, u)), cross(u, v))
+    return sub(mul(s, t), dot(u, v)), *plus(plus(scaled(s, v), scaled(t, u)), cross(u, v))
 
 
 def rotate(q: Quaternion, v: Triple) -> Triple:
     """Return the vector `v` turned by the unit quaternion `q`."""
     u = q[1:]
-    twice = scale(2, cross(u, v))
-    return plus(plus(v, scale(q[0], twice)), cross(u, twice))
+    twice = scaled(2, cross(u, v))
+    return plus(plus(v, scaled(q[0], twice)), cross(u, twice))
 
 
-def conjugate(q: Quaternion) -> Quaternion:
+def inverse(q: Quaternion) -> Quaternion:
     """Return the quaternion of the inverse rotation."""
     w, x, y, z = q
     return w, -x, -y, -z
@@ -51,7 +51,7 @@ def product(factors: Quaternion) -> Quaternion:
         w, *xyz = factors
         odd = (0, w.shape[0] % 2)
         pairs = [c.reshape(-1, 2) for c in (jnp.pad(w, odd, constant_values=1), *(jnp.pad(c, odd) for c in xyz))]
-        factors = materialize(times(*(tuple(c[:, side] for c in pairs) for side in (0, 1))))
+        factors = materialize(multiply(*(tuple(c[:, side] for c in pairs) for side in (0, 1))))
     return tuple(c[0] for c in factors)
 
 
@@ -62,7 +62,7 @@ def products_up_to(factors: Quaternion) -> Quaternion:
     """
     length = 1
     while length < factors[0].shape[0]:
-        factors = materialize(times(shift(factors, length), factors))
+        factors = materialize(multiply(shift(factors, length), factors))
         length *= 2
     return factors
 

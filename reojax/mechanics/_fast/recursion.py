@@ -14,8 +14,6 @@ At the base, about the centre of mass, `A = J - m (|c|^2 - c c^T)` with `c = f /
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import jax
-
 from reojax.mechanics._fast.materialize import materialize
 from reojax.mechanics._fast.parameters import RobotScalars
 from reojax.mechanics._fast.scalar import (
@@ -26,16 +24,15 @@ from reojax.mechanics._fast.scalar import (
     Vector,
     add,
     apply,
-    conjugate,
     cross,
     dot,
     mul,
     plus,
     point_inertia,
+    scaled,
     sub,
-    times,
+    turned_inertia,
 )
-from reojax.mechanics._fast.sincos import sincos
 
 AT_ONCE = 4
 """So many joints are computed in one loop; more values than they read would not be vectorised."""
@@ -54,10 +51,16 @@ class Base(NamedTuple):
     """Velocity of the centre of mass while the base rests."""
 
 
-def omega(robot: RobotScalars, theta: Sequence[jax.Array], rate: Sequence[jax.Array]) -> Vector:
-    """Angular velocity of the base, base frame, at joint angles `theta` and `rate`, arrays of one shape."""
-    base = inward(robot, [sincos(angle) for angle in theta], rate)
-    return solve(base.inertia, times(-1, base.momentum))
+class Subtree(NamedTuple):
+    """A link and all that hangs on it, in its frame, about its origin."""
+
+    mass: Scalar
+    moment: Vector
+    inertia: Symmetric
+    push: Vector
+    """Linear momentum that the joint rates give while the base rests."""
+    spin: Vector
+    """Angular momentum likewise."""
 
 
 def inward(
@@ -65,39 +68,58 @@ def inward(
 ) -> Base:
     """Gather inertia and momentum from the tips to the base.
 
-    In long robots, what every fourth joint hands on is kept (`store`), or every joint where axes are data, or if
+    In long robots, what every fourth joint hands on is kept (`materialize`), or every joint where axes are data, or if
     `by_joint`: without, XLA computes long chains again for every value they end in, and compile time grows with their
     square or worse.
     """
     long = len(robot.parent) > AT_ONCE
     every = 1 if by_joint or (long and not robot.axes_known) else AT_ONCE
-    m = list(robot.mass)
-    f, J = list(robot.moment), list(robot.inertia)
-    p, h = [ZERO] * len(m), [ZERO] * len(m)
+    subtree = [
+        Subtree(m, f, J, ZERO, ZERO) for m, f, J in zip(robot.mass, robot.moment, robot.inertia, strict=True)
+    ]  # so far the link alone
     for k in reversed(range(len(robot.parent))):
-        link, parent, e, a = k + 1, robot.parent[k], robot.axis[k], robot.anchor[k]
+        parent, e = robot.parent[k], robot.axis[k]
         E = joint_rotation(e, *sine_cosine[k])
-        push = apply(E, plus(p[link], times(rate[k], cross(e, f[link]))))
-        spin = apply(E, plus(h[link], times(rate[k], apply_symmetric(J[link], e))))
-        rotor = times(mul(rate[k], robot.rotor_momentum[k]), e)
-        moment = apply(E, f[link])
-        p[parent] = plus(p[parent], push)
-        h[parent] = plus(h[parent], plus(plus(spin, rotor), cross(a, push)))
-        J[parent] = plus(J[parent], plus(conjugate(E, J[link]), _shift(m[link], moment, a)))
-        f[parent] = plus(f[parent], plus(moment, times(m[link], a)))
-        m[parent] = add(m[parent], m[link])
-        if k and k % every == 0:
-            moving = materialize((*p[parent], *h[parent]))
-            p[parent], h[parent], J[parent], f[parent] = (
-                moving[:3],
-                moving[3:],
-                materialize(J[parent]),
-                materialize(f[parent]),
-            )
-    centre, drift = times(1 / m[0], f[0]), times(1 / m[0], p[0])
+        handed = hand_on(subtree[k + 1], E, e, robot.anchor[k], rate[k], robot.rotor_momentum[k])
+        total = together(subtree[parent], handed)
+        subtree[parent] = keep(total) if k and k % every == 0 else total
+    return about_centre(subtree[0])
+
+
+def hand_on(link: Subtree, E: Matrix, e: Vector, anchor: Vector, rate: Scalar, rotor: Scalar) -> Subtree:
+    """What a joint hands on to the link that it hangs from: the equations of the module's first lines."""
+    # the joint's rate turns all beyond it about e
+    turned_push = plus(link.push, scaled(rate, cross(e, link.moment)))
+    turned_spin = plus(link.spin, scaled(rate, apply_symmetric(link.inertia, e)))
+    # into the frame of the link before, and to its origin
+    push, spin, moment = (apply(E, vector) for vector in (turned_push, turned_spin, link.moment))
+    own_rotor = scaled(mul(rate, rotor), e)
+    return Subtree(
+        mass=link.mass,
+        moment=plus(moment, scaled(link.mass, anchor)),
+        inertia=plus(turned_inertia(E, link.inertia), _shift(link.mass, moment, anchor)),
+        push=push,
+        spin=plus(plus(spin, own_rotor), cross(anchor, push)),
+    )
+
+
+def together(a: Subtree, b: Subtree) -> Subtree:
+    """Sum of what hangs on one link."""
+    return Subtree(add(a.mass, b.mass), *(plus(x, y) for x, y in zip(a[1:], b[1:], strict=True)))
+
+
+def keep(link: Subtree) -> Subtree:
+    """Compute it once, for all that read it (`materialize`)."""
+    moving = materialize((*link.push, *link.spin))
+    return Subtree(link.mass, materialize(link.moment), materialize(link.inertia), moving[:3], moving[3:])
+
+
+def about_centre(whole: Subtree) -> Base:
+    """Inertia and momentum of the whole robot about its centre of mass, of what hangs on its base."""
+    centre, drift = (scaled(1 / whole.mass, vector) for vector in (whole.moment, whole.push))
     return Base(
-        inertia=plus(J[0], times(-1, point_inertia(m[0], centre))),
-        momentum=plus(h[0], times(-1, cross(centre, p[0]))),
+        inertia=plus(whole.inertia, scaled(-1, point_inertia(whole.mass, centre))),
+        momentum=plus(whole.spin, scaled(-1, cross(centre, whole.push))),
         centre=centre,
         drift=drift,
     )
@@ -128,16 +150,16 @@ def joint_rotation(e: Vector, s: Scalar, c: Scalar) -> Matrix:
 
 def _shift(mass: Scalar, moment: Vector, a: Vector) -> Symmetric:
     """What moving by `a` adds to the inertia of a body of `mass` and first `moment`."""
-    g = plus(moment, times(mul(0.5, mass), a))
+    g = plus(moment, scaled(mul(0.5, mass), a))
     x, y, z = (mul(p, q) for p, q in zip(a, g, strict=True))
     products = tuple(add(mul(a[i], g[j]), mul(a[j], g[i])) for i, j in ((0, 1), (0, 2), (1, 2)))
-    return (*times(2, (add(y, z), add(x, z), add(x, y))), *times(-1, products))
+    return (*scaled(2, (add(y, z), add(x, z), add(x, y))), *scaled(-1, products))
 
 
 def solve(A: Symmetric, right: Vector) -> Vector:
     """Solve `A x = right`, `A` symmetric positive definite."""
     adjugate, determinant = _adjugate(A)
-    return times(1 / determinant, apply_symmetric(adjugate, right))
+    return scaled(1 / determinant, apply_symmetric(adjugate, right))
 
 
 def _adjugate(A: Symmetric) -> tuple[Symmetric, Scalar]:

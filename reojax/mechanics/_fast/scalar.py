@@ -65,7 +65,9 @@ def _alike(a: Any, b: Any) -> tuple[jax.Array, jax.Array]:
 
 def sub(a: Scalar, b: Scalar) -> Any:
     """Return `a - b`."""
-    return add(a, mul(-1, b))
+    if _known(a) or _known(b):
+        return add(a, mul(-1, b))
+    return jax.lax.sub(*_alike(a, b))
 
 
 def dot(a: Vector, b: Vector) -> Any:
@@ -87,7 +89,7 @@ def plus(a: tuple[Scalar, ...], b: tuple[Scalar, ...]) -> tuple[Any, ...]:
     return tuple(add(x, y) for x, y in zip(a, b, strict=True))
 
 
-def times(s: Scalar, a: tuple[Scalar, ...]) -> tuple[Any, ...]:
+def scaled(s: Scalar, a: tuple[Scalar, ...]) -> tuple[Any, ...]:
     """Return a vector or a symmetric matrix scaled by `s`."""
     return tuple(mul(s, x) for x in a)
 
@@ -103,7 +105,7 @@ def full(s: Symmetric) -> Matrix:
     return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
-def conjugate(rotation: Matrix, s: Symmetric) -> Symmetric:
+def turned_inertia(rotation: Matrix, s: Symmetric) -> Symmetric:
     """Return `rotation @ s @ rotation.T`."""
     rows = [apply(full(s), row) for row in rotation]  # the rows of rotation @ s
     x, y, z = rotation
@@ -115,7 +117,7 @@ def point_inertia(mass: Scalar, d: Vector) -> Symmetric:
     x, y, z = d
     xx, yy, zz = mul(x, x), mul(y, y), mul(z, z)
     products = (mul(x, y), mul(x, z), mul(y, z))
-    return times(mass, (add(yy, zz), add(xx, zz), add(xx, yy), *times(-1, products)))
+    return scaled(mass, (add(yy, zz), add(xx, zz), add(xx, yy), *scaled(-1, products)))
 
 
 def transpose(matrix: Matrix) -> Matrix:
