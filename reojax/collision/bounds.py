@@ -21,7 +21,7 @@ from jaxtyping import Float
 
 from reojax.collision.chains import Geometry, Structure, acceleration_bound, chains_of, levers
 from reojax.collision.clearance import radii
-from reojax.collision.placement import PairEnds, pair_ends
+from reojax.collision.placement import PairEnds, pair_ends_from_between
 from reojax.collision.segments import Points, between, dot
 from reojax.mechanics._fast.materialize import materialize
 
@@ -81,7 +81,7 @@ def interval_bounds(
         rounding: of `Edges`.
     """
     joints, stretches, samples = theta.shape
-    flat = pair_ends(structure, geometry, theta.reshape(joints, stretches * samples))
+    flat = pair_ends_from_between(structure, geometry, theta.reshape(joints, stretches * samples))
     ends = PairEnds(*(x.reshape(3, -1, stretches, samples) for x in flat))
     w = jnp.stack(materialize(tuple(between(*ends))))
     square = dot(w, w)

@@ -6,15 +6,20 @@ the answer with `path_clearance`, and where samples missed something, ask for so
 
 from __future__ import annotations
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array, common_float
-from reojax.collision.chains import acceleration_bound, geometry_of, structure_of, unit_axes
+from reojax.collision.chains import Geometry, Structure, acceleration_bound, geometry_of, structure_of, unit_axes
 from reojax.collision.clearance import clearances, radii
+from reojax.collision.placement import pair_ends
+from reojax.collision.segments import segment_distance
 from reojax.robot import Robot
 
 _ROUND = 0.02
@@ -45,7 +50,7 @@ def clearance_shortfall(
     samples: int | None = None,
     between: float = 0.0,
 ) -> Float[jax.Array, " g"]:
-    """What is missing to a clearance of `margin` along a path: negative where it is kept, smooth, for an inequality.
+    """What is missing to a clearance of `margin` along a path: negative where it is kept, for an inequality.
 
     Per edge, or per run of edges of a long path; in units of the mean sum of two radii, which makes it some 1 in size.
     The least over samples and pairs is rounded off to the safe side. Empty for robots without pairs.
@@ -59,19 +64,81 @@ def clearance_shortfall(
             `M h^2 / 8` on how far a point leaves its chord: 2 makes a proof by `path_clearance` all but sure, at a cost
             where edges are long.
     """
-    points = jnp.asarray(waypoints)
-    edges = len(points) - 1
+    edges = waypoints.shape[0] - 1
     samples = samples or max(1, -(-_SAMPLES // edges))
-    structure = structure_of(robot)
+    geometry, structure = geometry_of(robot), structure_of(robot)
+    dtype = common_float(geometry, waypoints)
+    points, geometry = jnp.asarray(waypoints, dtype), unit_axes(geometry, dtype)
     if not structure.pairs:
-        return jnp.zeros(0, points.dtype)
-    geometry = unit_axes(geometry_of(robot), common_float(robot, points))
-    size = radii(structure, geometry).mean()
-    least = edge_clearances(robot, points, samples)
-    if between:
-        bend = acceleration_bound(structure, geometry, (points[1:] - points[:-1]).T)
-        least = least - (between / (8 * samples**2)) * bend.T[:, None]
-    flat = least.reshape(edges, -1) / size
+        return jnp.zeros(0, dtype)
+    least = _least(structure, samples, between, geometry, points[:-1], points[1:])
     groups = np.array_split(np.arange(edges), min(edges, _GROUPS))
-    rounded = [_ROUND * jax.nn.logsumexp(-flat[group[0] : group[-1] + 1] / _ROUND) for group in groups]
-    return jnp.stack(rounded) + jnp.asarray(margin) / size
+    rounded = [_ROUND * jax.nn.logsumexp(-least[group[0] : group[-1] + 1] / _ROUND) for group in groups]
+    return jnp.stack(rounded) + jnp.asarray(margin, dtype) / _size(structure, geometry)
+
+
+def _size(structure: Structure, geometry: Geometry) -> jax.Array:
+    return radii(structure, geometry).mean()
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0, 1, 2))
+def _least(
+    structure: Structure, samples: int, between: float, geometry: Geometry, start: jax.Array, end: jax.Array
+) -> jax.Array:
+    """Least clearance at the samples of each edge (e,), rounded off over the pairs, as `clearance_shortfall` has it.
+
+    Its derivative is that at the closest sample of each edge alone, found first: one posture an edge.
+    """
+    return _at(structure, samples, between, geometry, start, end, _closest(structure, samples, geometry, start, end))
+
+
+@partial(_least.defjvp, symbolic_zeros=True)
+def _least_jvp(structure, samples, between, primals, tangents):
+    geometry, start, end = primals
+    share = _closest(structure, samples, geometry, start, end)
+
+    def value(geometry: Geometry, start: jax.Array, end: jax.Array) -> jax.Array:
+        return _at(structure, samples, between, geometry, start, end, share)
+
+    least, back = jax.vjp(lambda start, end: value(geometry, start, end), start, end)
+    by_start, by_end = back(jnp.ones_like(least))  # edges do not depend on each other: one pass for all
+    change = jnp.zeros_like(least)
+    for slope, moved in ((by_start, tangents[1]), (by_end, tangents[2])):
+        if not _is_zero(moved):
+            change = change + (slope * moved).sum(1)
+    if not all(map(_is_zero, tangents[0])):
+        filled = [jnp.zeros_like(x) if _is_zero(t) else t for x, t in zip(geometry, tangents[0], strict=True)]
+        change = change + jax.jvp(lambda geometry: value(geometry, start, end), (geometry,), (Geometry(*filled),))[1]
+    return least, change
+
+
+def _is_zero(tangent: object) -> bool:
+    return isinstance(tangent, SymbolicZero)
+
+
+def _closest(
+    structure: Structure, samples: int, geometry: Geometry, start: jax.Array, end: jax.Array
+) -> Float[jax.Array, " e"]:
+    """Where on each edge the closest sample lies, from 0 to 1."""
+    share = jnp.arange(samples + 1, dtype=start.dtype) / samples
+    theta = start.T[:, :, None] + (end - start).T[:, :, None] * share[None, None]
+    ends = pair_ends(structure, geometry, theta.reshape(len(theta), -1))
+    gap = segment_distance(*ends) - radii(structure, geometry)[:, None]
+    return share[gap.min(0).reshape(-1, samples + 1).argmin(1)]
+
+
+def _at(
+    structure: Structure,
+    samples: int,
+    between: float,
+    geometry: Geometry,
+    start: jax.Array,
+    end: jax.Array,
+    share: Float[jax.Array, " e"],
+) -> Float[jax.Array, " e"]:
+    """Least clearance of the pairs at one place of each edge, rounded off, in units of the mean sum of two radii."""
+    theta = start + (end - start) * share[:, None]
+    gap = segment_distance(*pair_ends(structure, geometry, theta.T)) - radii(structure, geometry)[:, None]
+    if between:
+        gap = gap - between / (8 * samples**2) * acceleration_bound(structure, geometry, (end - start).T)
+    return -_ROUND * jax.nn.logsumexp(-gap / (_ROUND * _size(structure, geometry)), axis=0)

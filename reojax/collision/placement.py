@@ -1,4 +1,4 @@
-"""Where the capsules of all pairs are, each pair seen from a link between its two, at many postures at once."""
+"""Where the capsules of all pairs are, at many postures at once."""
 
 from __future__ import annotations
 
@@ -24,26 +24,45 @@ class PairEnds(NamedTuple):
 
 
 def pair_ends(structure: Structure, geometry: Geometry, theta: Float[Array, "j s"]) -> PairEnds:
-    """Place the capsules of all pairs at postures `theta` [rad], each pair in the frame of `chains_of`."""
-    rotation, origin = _link_poses(structure.parent, geometry, jnp.asarray(theta))
-    capsules = np.array(structure.pairs, int).reshape(-1, 2)
-    link = np.array(structure.capsule_link, int)[capsules]
+    """Place the capsules of all pairs at postures `theta` [rad], in the base frame."""
+    return _of_pairs(structure, *_ends(structure, geometry, _link_poses(structure.parent, geometry, theta)))
+
+
+def pair_ends_from_between(structure: Structure, geometry: Geometry, theta: Float[Array, "j s"]) -> PairEnds:
+    """The same, each pair seen from the link of its `chains_of`, between its two."""
+    rotation, origin = poses = _link_poses(structure.parent, geometry, theta)
     frame = chains_of(structure).frame
-    back, home = rotation[frame], origin[frame]  # (p, 3, 3, s), (p, 3, s)
-    ends = []
-    for side in (0, 1):
-        turned, place = rotation[link[:, side]], origin[link[:, side]]
-        for point in (geometry.start, geometry.end):
-            own = point[capsules[:, side]]
-            seen = place + (turned * own[:, None, :, None]).sum(2) - home
-            ends.append((back * seen[:, :, None]).sum(1).swapaxes(0, 1))
-    return PairEnds(*ends)
+    back, home = rotation[frame], origin[frame].swapaxes(0, 1)  # (p, 3, 3, s), (3, p, s)
+
+    def seen(point: jax.Array) -> jax.Array:
+        from_home = (point - home).swapaxes(0, 1)
+        return (back * from_home[:, :, None]).sum(1).swapaxes(0, 1)
+
+    return PairEnds(*map(seen, _of_pairs(structure, *_ends(structure, geometry, poses))))
+
+
+def _of_pairs(structure: Structure, start: jax.Array, end: jax.Array) -> PairEnds:
+    first, second = np.array(structure.pairs, int).reshape(-1, 2).T
+    return PairEnds(start[:, first], end[:, first], start[:, second], end[:, second])
+
+
+def _ends(
+    structure: Structure, geometry: Geometry, poses: tuple[jax.Array, jax.Array]
+) -> tuple[Float[jax.Array, "3 c s"], Float[jax.Array, "3 c s"]]:
+    """Ends of the centre lines of all capsules, base frame."""
+    link = np.array(structure.capsule_link, int)
+    rotation, origin = (x[link] for x in poses)
+    start, end = (
+        (origin + (rotation * own[:, None, :, None]).sum(2)).swapaxes(0, 1) for own in (geometry.start, geometry.end)
+    )
+    return start, end
 
 
 def _link_poses(
-    parent: tuple[int, ...], geometry: Geometry, theta: Float[jax.Array, "j s"]
+    parent: tuple[int, ...], geometry: Geometry, theta: Float[Array, "j s"]
 ) -> tuple[Float[jax.Array, "n 3 3 s"], Float[jax.Array, "n 3 s"]]:
     """Orientation and origin of every link's frame in the base frame (Rodrigues, link by link outwards)."""
+    theta = jnp.asarray(theta)
     samples = theta.shape[1]
     rotation = [jnp.broadcast_to(jnp.eye(3, dtype=theta.dtype)[:, :, None], (3, 3, samples))]
     origin = [jnp.zeros((3, samples), theta.dtype)]

@@ -15,6 +15,7 @@ from reojax._internal.arrays import Array
 from reojax.manoeuvres import Layout
 from reojax.planning import quaternions
 from reojax.planning.checks import a_robot, key_of, robot_and_layout
+from reojax.planning.clear_paths import Clear, check_clearance
 from reojax.planning.free_polygons import polygons_of
 from reojax.planning.free_search import Search, apart
 from reojax.planning.freedom import Freedom, freedom_of
@@ -27,6 +28,9 @@ from reojax.robot import Robot
 _CORNERS = ((4, 8), (8, 6), (10**9, 5))
 """Free corners by default, up to so many moving joints. Three make a rectangle; each further one costs as many
 variables as joints move, and robots of many joints have loops enough of few corners."""
+
+_AGAIN = 3
+"""How often more clearance is asked for at the samples, where the path between them comes too near."""
 
 
 class FreePaths(NamedTuple):
@@ -68,6 +72,7 @@ def free_path(
     lower: ArrayLike | None = None,
     upper: ArrayLike | None = None,
     repeats: int | Literal["least"] = 1,
+    clearance: float | None = None,
     twist_limit: float | None = None,
     bend_limit: float | None = None,
     layout: Layout | None = None,
@@ -91,6 +96,7 @@ def free_path(
         lower=lower,
         upper=upper,
         repeats=repeats,
+        clearance=clearance,
         twist_limit=twist_limit,
         bend_limit=bend_limit,
         layout=layout,
@@ -116,6 +122,7 @@ def free_paths(
     lower: ArrayLike | None = None,
     upper: ArrayLike | None = None,
     repeats: int | Literal["least"] = 1,
+    clearance: float | None = None,
     twist_limit: float | None = None,
     bend_limit: float | None = None,
     layout: Layout | None = None,
@@ -143,6 +150,8 @@ def free_paths(
         upper: number or (j,), upper limits, likewise.
         repeats: how often the path is run, from 1 to 1 000 000; or "least" for the least number of runs that is found
             to reach the target. More than one run needs a closed path.
+        clearance: least distance between the robot's parts, from 0 up, that is proven to be kept along the whole path
+            [m]; default not asked. The two postures must have it.
         twist_limit: with `bend_limit`, in place of `joints`, `lower` and `upper`, for robots with a layout: largest
             angle of the distal joints, either way [rad]. Only they and the centre joint move, feet folded meanwhile.
         bend_limit: largest angle of the centre joint, either way [rad].
@@ -182,7 +191,12 @@ def free_paths(
 
     with jax.enable_x64(True):
         robot = jax.tree.map(lambda leaf: np.asarray(leaf, float), robot)
-        return _solve(robot, given, freedom, before, repeats, corners, starts, tolerance, max_steps, seed, progress)
+        clear = None
+        if clearance is not None:
+            postures = {"the posture at the start": freedom.start, "the posture at the end": freedom.end}
+            clear = Clear(robot, check_clearance(robot, clearance, postures))
+        options = (repeats, corners, starts, tolerance, max_steps, seed, progress, clear)
+        return _solve(robot, given, freedom, before, *options)
 
 
 def _solve(
@@ -197,6 +211,7 @@ def _solve(
     max_steps: int,
     seed: int,
     progress: bool,
+    clear: Clear | None,
 ) -> FreePaths:
     count = len(freedom.joints)
     corners = corners or next(number for most, number in _CORNERS if count <= most)
@@ -212,13 +227,14 @@ def _solve(
     x, runs = np.zeros((len(inside), corners * count + 1)), np.ones(len(inside), int)
     moving = np.flatnonzero(~still)
     if len(moving):
-        search = Search(polygons, table, freedom, starts, max_steps, tolerance)
+        search = Search(polygons, table, freedom, starts, max_steps, tolerance, clear)
         with search.bar(progress):
             if repeats == "least":
                 x[moving], runs[moving] = least_repeats(search, possible[moving])
             else:
                 runs[moving] = repeats
                 x[moving] = repeated(search, possible[moving], runs[moving])
+            _clear_again(search, x, runs, possible, moving)
     paths = polygons.paths(x, freedom)
     paths[still] = np.where(np.arange(corners + 2)[:, None] <= corners, freedom.start, freedom.end)
     one = quaternions.from_matrices(polygons.rotations(paths))
@@ -230,19 +246,38 @@ def _solve(
     paths = np.concatenate([next(ends), paths, next(ends)], axis=1)
     if len(before):
         paths[still] = 0.0
+    proven = None if clear is None else clear.proven(paths)
+    kept = np.full(len(paths), True) if clear is None or proven is None else proven >= clear.margin
     return FreePaths(
         waypoints=paths,
         rotation=rotation,
         error=error,
         travel=np.abs(np.diff(paths, axis=1)).sum((1, 2)) * runs,
         repeats=runs,
-        converged=error <= tolerance,
-        status=np.array([_status(*row, tolerance, reach) for row in zip(error, beyond, strict=True)]),
-        clearance=None,
+        converged=(error <= tolerance) & kept,
+        status=np.array([_status(*row, tolerance, reach) for row in zip(error, beyond, kept, strict=True)]),
+        clearance=proven,
     )
 
 
-def _status(error: float, beyond: float, tolerance: float, reach: Reach) -> str:
+def _clear_again(search: Search, x: np.ndarray, runs: np.ndarray, targets: np.ndarray, moving: np.ndarray) -> None:
+    """Solve again what came too near between the samples, with more clearance asked for at them; changes `x`."""
+    if search.clear is None:
+        return
+    for _ in range(_AGAIN):
+        near = moving[~search.clear.kept(search.polygons.paths(x[moving], search.freedom))]
+        if not len(near):
+            return
+        search.spare = 2 * search.spare + 1e-4
+        x[near] = repeated(search, targets[near], runs[near], x[near][:, None])
+
+
+def _status(error: float, beyond: float, kept: bool, tolerance: float, reach: Reach) -> str:
+    if not kept:
+        return (
+            "not found: the closest path does not keep the clearance, which proves nothing; more starts or corners, "
+            "wider limits, or less clearance, may reach it"
+        )
     if error <= tolerance:
         return "converged"
     if beyond > tolerance:

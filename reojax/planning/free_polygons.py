@@ -18,6 +18,7 @@ from jaxtyping import Float
 
 from reojax import so3
 from reojax._internal.arrays import Array
+from reojax.collision.constraint import clearance_shortfall
 from reojax.mechanics.holonomy import net_rotation
 from reojax.path import Path
 from reojax.planning.checks import key_of
@@ -30,6 +31,8 @@ COARSE, FINE = 2, 8
 rotation by some 1e-5, which the last solutions make up for, the fine ones by 1e-13."""
 _CALL = 256
 """Polygons whose rotations are computed together."""
+_SAMPLES = 16
+"""Postures per edge at which the clearance is held while searching; answers are proven afterwards."""
 _KEPT = 8
 """Robots and joints whose programs are kept."""
 
@@ -47,6 +50,8 @@ class Aim(NamedTuple):
     """Rounding of the travel on each edge [rad]."""
     far: Float[Array, ""]
     """0 where travel is made least, 1 where `turn` is made largest."""
+    margin: Float[Array, ""]
+    """Clearance to keep [m]; of no effect where none is asked for."""
 
 
 class Polygons(NamedTuple):
@@ -58,6 +63,8 @@ class Polygons(NamedTuple):
     """Joint travel, rounded off; or `turn` with a minus, where an aim is to go far."""
     miss: Callable[[Array, Aim], Array]
     """Rotation vector (3,) from the target, by `COARSE` steps."""
+    too_near: Callable[[Array, Aim], Array]
+    """What is missing to the clearance, for an inequality."""
     turned: Callable[..., Array]
     """Net rotations (m, 3, 3) of whole paths (m, v, j), steps per edge."""
 
@@ -98,13 +105,18 @@ def _polygons_of(robot: Robot, joints: tuple[int, ...], moves: np.ndarray, corne
         rounded = jnp.sqrt(edges * edges + aim.rounding**2) - aim.rounding
         return (1 - aim.far) * (rounded * weight[None]).sum() - aim.far * x[-1]
 
-    def miss(x: Array, aim: Aim) -> Array:
+    def points(x: Array, aim: Aim) -> Array:
         base = aim.ends[0] - moves @ aim.ends[0][place]
-        points = jnp.concatenate([aim.ends[:1], base[None] + inner(x) @ moves.T, aim.ends[1:]])
+        return jnp.concatenate([aim.ends[:1], base[None] + inner(x) @ moves.T, aim.ends[1:]])
+
+    def miss(x: Array, aim: Aim) -> Array:
         target = aim.target @ so3.exp(x[-1] * aim.axis)
-        return so3.log(target.T @ net_rotation(robot, Path(points), steps=COARSE))
+        return so3.log(target.T @ net_rotation(robot, Path(points(x, aim)), steps=COARSE))
+
+    def too_near(x: Array, aim: Aim) -> Array:
+        return clearance_shortfall(robot, points(x, aim), aim.margin, samples=_SAMPLES)
 
     def turned(paths: Array, steps: int) -> Array:
         return jax.vmap(lambda path: net_rotation(robot, Path(path), steps=steps))(paths)
 
-    return Polygons(corners, moves, travel, miss, jax.jit(turned, static_argnums=1))
+    return Polygons(corners, moves, travel, miss, too_near, jax.jit(turned, static_argnums=1))

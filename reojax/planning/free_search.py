@@ -15,6 +15,7 @@ import numpy as np
 
 from reojax.optimisation.optimise import optimise
 from reojax.planning import quaternions
+from reojax.planning.clear_paths import Clear
 from reojax.planning.free_polygons import COARSE, Aim, Polygons
 from reojax.planning.freedom import Freedom
 from reojax.planning.polygon_table import PolygonTable
@@ -39,6 +40,10 @@ _ANY = 1e6
 """Slope that stops the solver as soon as the target is met."""
 _OFF = 1e6
 """Joint travel [rad] that is worse than any."""
+_SPARE = 0.02
+"""Share of the clearance that is asked for on top of it at first, for what lies between samples."""
+_LOOKED_AT = 256
+"""Random polygons near a target among which clear ones are sought."""
 _MOST_TURN = 3.0
 """Largest turn of one loop that is looked for [rad]; the logarithm has no derivative at a half turn."""
 
@@ -57,8 +62,10 @@ class Search:
         starts: int,
         max_steps: int,
         tolerance: float,
+        clear: Clear | None = None,
     ):
         self.polygons, self.table, self.freedom = polygons, table, freedom
+        self.clear, self.spare = clear, 0.0 if clear is None else _SPARE * clear.margin
         self.starts, self.max_steps, self.tolerance = starts, max_steps, tolerance
         corners = polygons.corners
         self._low = np.append(np.tile(freedom.low, corners), 0.0)
@@ -121,12 +128,14 @@ class Search:
                 lower=self._low,
                 upper=upper,
                 equality=self.polygons.miss,
+                inequality=None if self.clear is None else self.polygons.too_near,
                 data=Aim(
                     target=targets[take],
                     axis=axes[take] if turning else np.zeros((rows, 3)),
                     ends=np.repeat(ends[None], rows, 0),
                     rounding=np.full(rows, rounding * self._fine),
                     far=np.full(rows, float(turning)),
+                    margin=np.full(rows, 0.0 if self.clear is None else self.clear.margin + self.spare),
                 ),
                 tolerance=exact,
                 slope_tolerance=slope,
@@ -140,7 +149,7 @@ class Search:
 
     def _first(self, targets: np.ndarray, exact: np.ndarray, hints: np.ndarray | None) -> np.ndarray:
         """Polygons (m, f, n) for each target: of those from some starts the ones of least travel, or the closest."""
-        tried = np.array([self.table.near(target, _ROUNDS * self.starts) for target in targets])
+        tried = np.array([self._starts(target) for target in targets])
         if hints is not None:
             tried = np.concatenate([hints, tried], axis=1)[:, : tried.shape[1]]
         worth = np.full(tried.shape[:2], np.inf)
@@ -154,9 +163,20 @@ class Search:
                 x.reshape(len(owner), -1), targets[owner], exact[waiting].min(), _ROUND, self.max_steps
             )
             tried[waiting, first : first + self.starts] = x.reshape(shape)
+            if self.clear is not None:  # what touches between the samples is no answer
+                miss = np.where(self.clear.kept(self.polygons.paths(x, self.freedom)), miss, 10.0 + miss)
             value = _worth(miss, travel, _REACHED * exact[owner])
             worth[waiting, first : first + self.starts] = value.reshape(shape[:2])
         return np.take_along_axis(tried, worth.argsort(1)[:, :_FINALISTS, None], 1)
+
+    def _starts(self, target: np.ndarray) -> np.ndarray:
+        """Random polygons (s, n) near a target; those that are clear come first."""
+        count = _ROUNDS * self.starts
+        if self.clear is None:
+            return self.table.near(target, count)
+        x = self.table.near(target, max(_LOOKED_AT, count))
+        kept = self.clear.kept(self.polygons.paths(x, self.freedom))
+        return x[np.argsort(~kept, kind="stable")][:count]
 
     def _improve(self, found: np.ndarray, targets: np.ndarray, exact: np.ndarray, tolerance: np.ndarray) -> np.ndarray:
         """The best polygon (m, n) of some for each target, once they are improved to the end."""
@@ -182,6 +202,8 @@ class Search:
             for old, change in ((x, moved), (turned, true), (coarse, few), (error, off)):
                 old[going[better]] = change[better]
         paths = polygons.paths(x, self.freedom)
+        if self.clear is not None:
+            error = np.where(self.clear.kept(paths), error, 10.0 + error)  # worse than any miss
         worth = _worth(error, np.abs(np.diff(paths, axis=1)).sum((1, 2)), tolerance).reshape(shape)
         return np.take_along_axis(x.reshape(*shape, -1), worth.argmin(1)[:, None, None], 1)[:, 0]
 

@@ -89,9 +89,9 @@ def test_acceleration_bound_holds():
     robot = arm(capsules=8)
     structure, geometry = structure_of(robot), unit_axes(geometry_of(robot), np.dtype(float))
     rng = np.random.default_rng(1)
-    from reojax.collision.placement import pair_ends
+    from reojax.collision.placement import pair_ends_from_between
 
-    ends = jax.jit(lambda theta: pair_ends(structure, geometry, theta))
+    ends = jax.jit(lambda theta: pair_ends_from_between(structure, geometry, theta))
     for _ in range(10):
         start, turn = rng.uniform(-3, 3, (2, robot.joints))
         bound = np.asarray(acceleration_bound(structure, geometry, jnp.asarray(turn)[:, None]))[:, 0]
