@@ -19,8 +19,8 @@ _WORDS = 1 << 16
 
 FIRST = 3
 """Starts that are simply the nearest ones."""
-_CANDIDATES = 250
-"""Words among which the others are chosen."""
+_CANDIDATES, _CHOICE = 250, 3
+"""Words among which the others are chosen: so many, or so many times as many as are chosen."""
 
 _read = jax.jit(read)
 
@@ -67,7 +67,7 @@ class GuessTable:
         goes), then the second of every kind, and so on: where one fails, others of its kind mostly fail too.
         """
         index, tree = self._of(slots)
-        asked = count if count <= FIRST else max(count, _CANDIDATES)
+        asked = count if count <= FIRST else max(_CHOICE * count, _CANDIDATES)
         distance, nearest = tree.query(target.T, k=asked, workers=-1)
         distance, loops = distance.reshape(-1, asked), index[:, np.reshape(nearest, (-1, asked)) % index.shape[1]]
         if count < asked:
