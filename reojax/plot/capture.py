@@ -7,12 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reojax.captures.comparison import Comparison
-from reojax.drawing.colours import GREY, INK, JOINTS, PALE
-from reojax.plot._style import legend_above
+from reojax.drawing.colours import ANGLES, AXES, DASHES, INK, JOINTS
+from reojax.plot._style import dress, legend_above
 from reojax.robot import Robot
-
-_ANGLES = ("#d55e00", "#009e73", "#cc79a7")
-_SIGN = str.maketrans("-", "\u2212")
 
 
 def comparison_figure(robot: Robot, comparison: Comparison, *, title: str | None = None) -> Figure:
@@ -29,10 +26,9 @@ def comparison_figure(robot: Robot, comparison: Comparison, *, title: str | None
     figure = Figure(figsize=(7.2, 8.6), layout="constrained", facecolor="white")
     zxz, roll, joints = figure.subplots(3, 1, sharex=True, height_ratios=(1.15, 1, 1))
     c = comparison
-    tilt_y, roll_z, tilt_x = _ANGLES[2], _ANGLES[0], _ANGLES[1]
     names = ("first, z", "second, x'", "third, z''")
-    _draw(zxz, c.time, c.simulated_zxz, c.measured_zxz, c.zxz_rms, names, _ANGLES)
-    names, colours = ("tilt about x", "tilt about y", "roll about z"), (tilt_x, tilt_y, roll_z)
+    _draw(zxz, c.time, c.simulated_zxz, c.measured_zxz, c.zxz_rms, names, AXES[-1:] + AXES[:-1])
+    names, colours = zip(*ANGLES, strict=True)
     _draw(roll, c.time, c.simulated_tilt_roll, c.measured_tilt_roll, c.tilt_roll_rms, names, colours)
     _draw(joints, c.time, c.simulated_theta, c.measured_theta, c.theta_rms, robot.joint_names, JOINTS)
     zxz.set_ylabel("ZXZ angles of link 1 [deg]", color=INK)
@@ -56,20 +52,14 @@ def _draw(
     names: Sequence[str],
     colours: Sequence[str],
 ) -> None:
-    dashes = ((None, None), (None, None), (5, 2.5), (1.5, 1.5))
     for k, name in enumerate(names):
         colour = colours[k % len(colours)]
         label = name if not np.isfinite(rms[k]) else f"{name}, RMS {_degrees(rms[k])}"
-        axes.plot(time, np.rad2deg(simulated[:, k]), color=colour, label=label, linewidth=1.8, dashes=dashes[k % 4])
+        axes.plot(
+            time, np.rad2deg(simulated[:, k]), color=colour, label=label, linewidth=1.8, dashes=DASHES[k % len(DASHES)]
+        )
         axes.plot(time, np.rad2deg(measured[:, k]), ".", color=colour, markersize=3.2, alpha=0.55)
-    axes.set_axisbelow(True)
-    axes.grid(axis="y", color=PALE, linewidth=0.6)
-    axes.axhline(0, color=GREY, linewidth=0.8, zorder=0.9)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(GREY)
-    axes.tick_params(colors=INK, length=3, color=GREY)
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}".translate(_SIGN))
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}".translate(_SIGN))
+    dress(axes)
     axes.margins(x=0)
     legend_above(axes, columns=3)
 

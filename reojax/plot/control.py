@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array
-from reojax.drawing.colours import GREY, INK, JOINTS, PALE
+from reojax.drawing.colours import ANGLES, INK, JOINTS
 from reojax.mechanics.attitude import tilt_and_roll
 from reojax.motion.pid import Tracking
+from reojax.plot._style import dress, legend_above
 from reojax.robot import Robot
 
-_ANGLES = (("tilt about x", "#009e73"), ("tilt about y", "#cc79a7"), ("roll about z", "#d55e00"))
 _DASHED = (4, 2)
 
 
@@ -40,7 +39,7 @@ def tracking_figure(
         joints.plot(time, np.rad2deg(tracking.theta[:, k]), color=colour, label=name, linewidth=2)
         joints.plot(time, np.rad2deg(tracking.planned[:, k]), color=colour, linewidth=1.2, dashes=_DASHED)
         torque.plot(time, 1e3 * np.asarray(tracking.motor_torque)[:, k], color=colour, label=name, linewidth=1.2)
-    for k, (name, colour) in enumerate(_ANGLES):
+    for k, (name, colour) in enumerate(ANGLES):
         base.plot(time, np.rad2deg(done[:, k]), color=colour, label=name, linewidth=2)
         base.plot(time, np.rad2deg(wanted[:, k]), color=colour, linewidth=1.2, dashes=_DASHED)
     joints.set_ylabel("joint angles [deg]", color=INK)
@@ -48,7 +47,9 @@ def tracking_figure(
     torque.set_ylabel("motor torque [mN m]", color=INK)
     torque.set_xlabel("time [s]", color=INK)
     for axes in (joints, base, torque):
-        _dress(axes)
+        dress(axes)
+        axes.margins(x=0)
+        legend_above(axes)
     joints.set_title(title or robot.name, loc="left", pad=46, fontsize=13, fontweight="bold", color=INK)
     lag = np.rad2deg(np.abs(np.asarray(tracking.theta) - np.asarray(tracking.planned)).max())
     last = np.asarray(tracking.rotation)[-1].T @ np.asarray(planned)[-1]
@@ -56,30 +57,6 @@ def tracking_figure(
     text = f"dashed: as planned. The joints lag by up to {lag:.0f}°, and the orientation ends {miss:.1f}° off"
     joints.annotate(text, (0, 1), (0, 28), "axes fraction", "offset points", fontsize=10.5, color=INK)
     return figure
-
-
-def _dress(axes: Axes, columns: int = 6) -> None:
-    axes.set_axisbelow(True)
-    axes.grid(axis="y", color=PALE, linewidth=0.6)
-    axes.axhline(0, color=GREY, linewidth=0.8, zorder=0.9)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(GREY)
-    axes.tick_params(colors=INK, length=3, color=GREY)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "\u2212"))
-    axes.margins(x=0)
-    axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0, 1),
-        borderaxespad=0.3,
-        borderpad=0,
-        ncols=columns,
-        columnspacing=1.6,
-        frameon=False,
-        handlelength=2.2,
-        fontsize=9.5,
-        labelcolor=INK,
-    )
 
 
 def bandwidth_figure(bandwidth: ArrayLike, lag: dict[str, np.ndarray], chosen: dict[str, float]) -> Figure:
@@ -96,7 +73,8 @@ def bandwidth_figure(bandwidth: ArrayLike, lag: dict[str, np.ndarray], chosen: d
         axes.plot(bandwidth, np.rad2deg(values), "o-", color=colour, label=name, markersize=4)
         axes.axvline(chosen[name], color=colour, linewidth=1, linestyle=":")
     axes.set_xscale("log")
-    _dress(axes, columns=2)
+    dress(axes)
+    legend_above(axes, columns=2)
     axes.set_xticks([25, 50, 100, 200, 400])
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.margins(x=0.05)

@@ -156,4 +156,4 @@ def directions(axes: Axes3D, low: np.ndarray, high: np.ndarray) -> None:
     length = decade * max(step for step in (1, 2, 5) if step * decade <= 0.3 * half)
     draw_axes(axes, length, at=(low + high) / 2 + camera.T @ np.array([-0.8 * half, -0.85 * half, 0.0]))
     text = f"{1000 * length:g} mm" if length < 1 else f"{length:g} m"
-    axes.text2D(0.24, 0.07, f"x, y, z: {text}", transform=axes.transAxes, fontsize=7, color=INK)
+    axes.text2D(0.06, 0.0, f"x, y, z: {text}", transform=axes.transAxes, fontsize=7, color=INK)

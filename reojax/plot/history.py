@@ -15,7 +15,7 @@ from reojax.drawing.colours import ANGLES, DASHES, INK, JOINTS
 from reojax.mechanics.attitude import LEVEL, tilt_and_roll, zxz_without_jumps
 from reojax.mechanics.holonomy import rotation_history
 from reojax.path import Path
-from reojax.plot._style import dress
+from reojax.plot._style import dress_path
 from reojax.robot import Robot
 
 _SAMPLES = 64
@@ -56,7 +56,7 @@ def draw_orientation(
         near = np.abs(told[:, 1]) < LEVEL
         axes.fill_between(along, 0, 1, where=near, transform=axes.get_xaxis_transform(), color="#eeeeee", zorder=0)
     axes.set_ylabel("base orientation [deg]", color=INK)
-    dress(axes, edges)
+    dress_path(axes, edges)
     return axes
 
 
@@ -73,7 +73,7 @@ def draw_joints(axes: Axes, robot: Robot, path: Path) -> Axes:
         dashes, colour = DASHES[k % len(DASHES)], JOINTS[k % len(JOINTS)]
         axes.plot(corners[:, k], color=colour, label=label, linewidth=2, dashes=dashes)
     axes.set_ylabel("joint angles [deg]", color=INK)
-    dress(axes, path.edges)
+    dress_path(axes, path.edges)
     return axes
 
 

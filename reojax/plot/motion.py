@@ -3,13 +3,13 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reojax.drawing.colours import ANGLES, DASHES, GREY, INK, JOINTS, PALE
+from reojax.drawing.colours import ANGLES, DASHES, GREY, INK, JOINTS
 from reojax.mechanics.attitude import tilt_and_roll
 from reojax.motion.motor import Motor
 from reojax.motion.simulation import Motion
+from reojax.plot._style import dress, legend_above
 from reojax.robot import Robot
 
 _RPM = 30 / np.pi
@@ -64,7 +64,7 @@ def torque_speed_figure(
             label = f"limit at {supply:g} V" if sign > 0 else None
             axes.plot(along, limit, color=INK, linewidth=1.2, linestyle="--", label=label)
         axes.set_xlim(-reach, reach)
-        _dress(axes)
+        dress(axes, grid="both")
         axes.axvline(0, color=GREY, linewidth=0.8, zorder=0.9)
     for axes in panels[-1]:
         axes.set_xlabel("motor speed [rpm]", color=INK)
@@ -103,21 +103,9 @@ def motion_figure(robot: Robot, motion: Motion, *, title: str | None = None) -> 
         axes.set_ylabel(label, color=INK)
     for axes in (base, *joints):
         axes.set_xlim(time[0], time[-1])
-        _dress(axes)
+        dress(axes, grid="both")
     for axes in (base, joints[0]):
-        axes.legend(
-            loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0.3, ncols=6, frameon=False, fontsize=9.5,
-            labelcolor=INK,
-        )  # fmt: skip
+        legend_above(axes)
     joints[-1].set_xlabel("time [ms]", color=INK)
     base.set_title(title or robot.name, loc="left", pad=26, fontsize=12, fontweight="bold", color=INK)
     return figure
-
-
-def _dress(axes: Axes) -> None:
-    axes.set_axisbelow(True)
-    axes.grid(color=PALE, linewidth=0.6)
-    axes.axhline(0, color=GREY, linewidth=0.8, zorder=0.9)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(GREY)
-    axes.tick_params(colors=INK, length=3, color=GREY)

@@ -7,18 +7,19 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+from reojax import so3
 from reojax._internal.arrays import Array
-from reojax.drawing.colours import GREY, INK, PALE
+from reojax.drawing.colours import AXES, GREY, INK, PALE
+from reojax.drawing.view import View, default_view
 from reojax.mechanics.holonomy import rotation_history
 from reojax.path import polygon
 from reojax.planning import FreePaths, Plan
-from reojax.plot._style import dress
+from reojax.plot._style import dress_path
 from reojax.plot.history import draw_joints
 from reojax.robot import Robot
 
 _SAMPLES = 24
 """Samples per edge."""
-_AXES = (("x", "#0072b2"), ("y", "#e69f00"), ("z", "#d55e00"))
 _NAMED = 12
 """Most manoeuvres that are named under the picture."""
 
@@ -55,12 +56,12 @@ def plan_figure(
     grid = figure.add_gridspec(2, 2, width_ratios=(1, 1.25))
     sphere = figure.add_subplot(grid[:, 0], projection="3d")
     assert isinstance(sphere, Axes3D)
-    _draw_sphere(sphere, history, wanted)
+    _draw_sphere(sphere, history, wanted, default_view(robot))
     above = figure.add_subplot(grid[0, 1])
     below = figure.add_subplot(grid[1, 1], sharex=above)
     above.plot(np.linspace(0, path.edges, len(left)), left, color="#d55e00", linewidth=2, label="angle left")
     above.set_ylabel("to the target [deg]", color=INK)
-    dress(above, path.edges)
+    dress_path(above, path.edges)
     above.set_ylim(0, None)
     draw_joints(below, robot, path)
     below.set_xlabel("along the path, edge by edge", color=INK)
@@ -76,19 +77,22 @@ def plan_figure(
     return figure
 
 
-def _draw_sphere(axes: Axes3D, history: np.ndarray, wanted: np.ndarray) -> None:
+def _draw_sphere(axes: Axes3D, history: np.ndarray, wanted: np.ndarray, view: View) -> None:
     around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 37), np.linspace(0, np.pi, 19))
     ball = np.cos(around) * np.sin(up), np.sin(around) * np.sin(up), np.cos(up)
     axes.plot_wireframe(*ball, color=PALE, linewidth=0.4)
     track = history[:, :, 2].T
     axes.plot(*track, color=GREY, linewidth=1.6, label="track of z")
     axes.plot(*track[:, :1], "o", color=GREY, markersize=4)
-    for k, (name, colour) in enumerate(_AXES):
+    for k, (name, colour) in enumerate(zip("xyz", AXES, strict=True)):
         end, goal = history[-1, :, k], wanted[:, k]
         axes.plot(*np.stack([0 * end, end], axis=1), color=colour, linewidth=2.2, label=f"{name} at the end")
         axes.plot(*goal[:, None], "o", color=colour, markersize=9, markerfacecolor="none", markeredgewidth=1.6)
-    axes.set_box_aspect((1, 1, 1))
+    axes.set_box_aspect((1, 1, 1), zoom=1.25)  # pyright: ignore[reportArgumentType]  (zoom is a float)
+    axes.set_proj_type("ortho")
+    axes.view_init(elev=view.elevation, azim=view.azimuth, vertical_axis=view.up)
     axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
     axes.set_axis_off()
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.02), ncols=2, frameon=False, fontsize=9)
-    axes.set_title("base axes; rings: the target", fontsize=10.5, color=INK)
+    vector = ", ".join(f"{x:.1f}" for x in np.rad2deg(np.asarray(so3.log(wanted)))).replace("-", "\N{MINUS SIGN}")
+    axes.set_title(f"base axes; rings: the target,\nrotation vector ({vector})°", fontsize=10.5, color=INK)

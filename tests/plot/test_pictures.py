@@ -219,3 +219,16 @@ def test_bad_input_is_named(message, tmp_path):
     with pytest.raises(ValueError, match=pattern):
         BAD[message](tmp_path)
     assert not os.listdir(tmp_path)
+
+
+def test_three_axes_of_a_sweep_are_small_multiples():
+    """A column for each of up to four values of the third axis, all of a row on one scale, each saying its value."""
+    grid = {"u": np.linspace(0, 1, 6), "v": np.linspace(0, 1, 5), "w": np.array([1.0, 2.0, 4.0])}
+    found = reojax.sweep(lambda u, v, w: {"product": w * (u + v)}, grid)
+    figure = plot.sweep_figure(found, title="A sweep")
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert [title for title in titles if title] == ["product\nat w 1", "product\nat w 2", "product\nat w 4"]
+    panels = [axes for axes in figure.axes if axes.get_title(loc="left")]
+    scales = {(axes.collections[0].norm.vmin, axes.collections[0].norm.vmax) for axes in panels}
+    assert len(scales) == 1
+    assert scales.pop()[1] >= 8
