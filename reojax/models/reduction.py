@@ -138,12 +138,12 @@ def _held(joints: dict[str, JointEntry], lock: Mapping[str, float], notes: list[
                     f"`lock[{shorten(name)}]` is {value}; the joint's limits are {joint.lower:g} to {joint.upper:g}"
                 )
             held[name] = value
-            notes.append(f"locked: joint {shorten(name)} at {value:g}")
+            notes.append(f"locked: joint {shorten(name)} at {value!r}")
         elif joint.kind == "fixed":
             held[name] = 0.0
         elif joint.kind == "prismatic":
             held[name] = joint.rest
-            notes.append(f"locked: prismatic joint {shorten(name)} at {joint.rest:g} m")
+            notes.append(f"locked: prismatic joint {shorten(name)} at {joint.rest!r} m")
         elif joint.kind not in MOVING:
             raise ValueError(
                 f"joint {shorten(name)} is {joint.kind}; only revolute ones move: lock={{{name!r:.60}: 0}} holds it"
@@ -175,7 +175,7 @@ def _couplings(
             raise ValueError(f"joint {shorten(name)} mimics itself, by way of {shorten(driver)}")
         if driver in held:
             held[name] = ratio * held[driver] + offset
-            notes.append(f"locked: joint {shorten(name)} at {held[name]:g}, which follows {shorten(driver)}")
+            notes.append(f"locked: joint {shorten(name)} at {held[name]!r}, which follows {shorten(driver)}")
         elif name not in held:
             couplings[name] = (driver, ratio, offset)
             notes.append(f"coupled: joint {shorten(name)} = {ratio:g} * {shorten(driver)} + {offset:g} rad")
@@ -210,7 +210,7 @@ def _hold_what_carries_nothing(
         if all(driver != name or follower in idle for follower, (driver, _, _) in couplings.items()):
             held[name] = joints[name].rest
             couplings.pop(name, None)
-            notes.append(f"held at {held[name]:g}: joint {shorten(name)}, which carries no mass")
+            notes.append(f"held at {held[name]!r}: joint {shorten(name)}, which carries no mass")
 
 
 def _groups(

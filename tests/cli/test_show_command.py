@@ -39,7 +39,7 @@ def test_show_tells_what_a_file_holds(capsys, urdf):
     assert text.startswith("toy: 3 links, 2 joints, 7 kg")
     assert "shoulder  body    -57.3 .. 114.6" in text
     assert "note: merged into link 'arm': tool, slide" in text
-    assert "note: locked: prismatic joint 'rail' at 0 m" in text
+    assert "note: locked: prismatic joint 'rail' at 0.0 m" in text
     assert "momentum self-check: passed" in text
 
 

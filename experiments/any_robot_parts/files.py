@@ -1,0 +1,49 @@
+"""Where installed packages keep their robot files (extra `zoo`); nothing is copied or fetched."""
+
+import re
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+PACKAGES = {
+    "example-robot-data": ("urdf", "site", "cmeel.prefix/share/example-robot-data/robots"),
+    "icub-models": ("urdf", "prefix", "share/iCub"),
+    "pybullet": ("urdf", "package", "pybullet_data"),
+    "spartpy": ("urdf", "package", "SPARTpy"),
+    "gymnasium": ("xml", "package", "gymnasium"),
+    "dm_control": ("xml", "package", "dm_control"),
+}
+"""Ending of the files, kind of place, and place."""
+
+_MOVES = re.compile(r"type=.(revolute|continuous|prismatic|spherical|floating|planar)")
+_BODIES = re.compile(r"<(body|include)\b")
+
+
+def robot_files(package: str) -> list[Path]:
+    """Robot files of a package: URDFs with a joint that moves, MJCFs with a body.
+
+    Raises:
+        ValueError: if the package is not installed.
+    """
+    ending, kind, place = PACKAGES[package]
+    folder = _folder(kind, place)
+    if folder is None or not folder.is_dir():
+        raise ValueError(f'{package} is not installed: pip install "reojax[zoo]"')
+    return [file for file in sorted(folder.rglob(f"*.{ending}")) if _is_robot(file)]
+
+
+def _folder(kind: str, place: str) -> Path | None:
+    if kind == "prefix":
+        return Path(sys.prefix) / place
+    found = find_spec("numpy" if kind == "site" else place)
+    if found is None or not found.submodule_search_locations:
+        return None
+    here = Path(found.submodule_search_locations[0])
+    return here.parent / place if kind == "site" else here
+
+
+def _is_robot(file: Path) -> bool:
+    text = file.read_text(errors="replace")
+    if file.suffix == ".urdf":
+        return bool(_MOVES.search(text))
+    return "<mujoco" in text.replace("<mujocoinclude", "") and bool(_BODIES.search(text))
