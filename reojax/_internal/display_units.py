@@ -2,6 +2,8 @@
 
 from math import pi
 
+RPM = 30 / pi
+"""Turns per minute in one rad/s."""
 _SHOWN = {"rad": ("deg", 180 / pi), "kg m^2": ("kg mm^2", 1e6)}
 
 

@@ -1,7 +1,9 @@
 """What the subcommands share: the error for bad input, the parser, the reading of angles, the version."""
 
 import argparse
+import difflib
 import math
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
@@ -10,6 +12,12 @@ LARGEST_ANGLE = 36000.0
 """Largest amplitude at the command line [deg]: a hundred turns."""
 SHORTEST = 1e-4
 """Shortest duration at the command line [s]; a power of a shorter one may not be a number."""
+LONGEST = 1e4
+"""Longest duration at the command line [s]."""
+
+
+OPTIONS: dict[str, None] = {}
+"""Options of all subcommands."""
 
 
 class BadInput(Exception):
@@ -20,8 +28,17 @@ class Parser(argparse.ArgumentParser):
     """`ArgumentParser` that raises `BadInput` with one line, without the usage."""
 
     def error(self, message: str) -> NoReturn:
-        """Raise `BadInput`, led by the command's name."""
-        raise BadInput(f"{self.prog}: {message}")
+        """Raise `BadInput`, led by the command's name, with what may have been meant."""
+        wrong = re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)|unrecognized arguments: (--[\w-]+)", message)
+        known = [*OPTIONS] if wrong and wrong[3] else re.findall(r"[\w-]+", wrong[2]) if wrong else []
+        near = difflib.get_close_matches(wrong[1] or wrong[3], known, 1, 0.6) if wrong else []
+        message = message if len(message) <= 500 else f"{message[:350]} ... {message[-100:]}"
+        raise BadInput(f"{self.prog}: {message}" + (f"; did you mean {near[0]}?" if near else ""))
+
+    def add_argument(self, *names: Any, **options: Any) -> argparse.Action:
+        """Declare an argument, and remember the option's name for whoever mistypes it."""
+        OPTIONS.update(dict.fromkeys(name for name in names if name.startswith("--")))
+        return super().add_argument(*names, **options)
 
     def _print_message(self, message: str, file: Any = None) -> None:
         """Print help; argparse's own lets errors of the stream pass."""
@@ -64,7 +81,6 @@ def version() -> str:
 
 def _negative(text: str) -> bool:
     try:
-        float(text)
+        return text.startswith("-") and bool([float(part) for part in text.split(",")])
     except ValueError:
         return False
-    return text.startswith("-")

@@ -4,7 +4,9 @@ import argparse
 import warnings
 from typing import TYPE_CHECKING, Any
 
+from reojax._internal.display_units import RPM
 from reojax.cli._motors import motor_at
+from reojax.cli._planned import durations_of
 
 if TYPE_CHECKING:
     from reojax.motion.simulation import Motion
@@ -13,8 +15,6 @@ if TYPE_CHECKING:
 
 LAW = "quintic"
 """The law where only a duration is given."""
-RPM = 9.549296585513721
-"""Turns per minute in one rad/s."""
 _RESOLVED = 1e-4
 """Largest error of an orientation for which a spin counts as resolved [rad]."""
 
@@ -41,16 +41,11 @@ def motion_of(robot: "Robot", path: "Path", args: argparse.Namespace) -> "Motion
     Raises:
         ValueError: if nothing moves, the motors do not fit the robot, or it spins too fast for the samples.
     """
-    import numpy as np
-
     from reojax.motion.simulation import simulate
 
     if args.duration is None:
         return None
-    angles = np.abs(np.diff(path.waypoints, axis=0)).max(axis=1)
-    if not angles.sum() > 0:
-        raise ValueError("nothing moves: every edge of the manoeuvre stays put.")
-    durations = args.duration * angles / angles.sum()
+    durations = durations_of(path, args.duration)
     with warnings.catch_warnings():  # said below, as an error
         warnings.simplefilter("ignore", UserWarning)
         motion = simulate(
@@ -63,7 +58,7 @@ def motion_of(robot: "Robot", path: "Path", args: argparse.Namespace) -> "Motion
         )
     if motion.error is not None and float(motion.error) > _RESOLVED:
         raise ValueError(
-            f"argument --momentum: {args.momentum} kg m^2/s for {args.duration:g} s spins too fast to be resolved "
+            f"argument --momentum: {args.momentum} kg m^2/s for {durations.sum():g} s spins too fast to be resolved "
             f"(the orientation is uncertain by about {float(motion.error):.1g} rad)"
         )
     return motion

@@ -4,15 +4,13 @@ import argparse
 import math
 from typing import TYPE_CHECKING
 
-from reojax.cli._arguments import SHORTEST
+from reojax.cli._arguments import LONGEST, SHORTEST
 
 if TYPE_CHECKING:
     from reojax.motion.motor import Motor
 
 WEAKEST = 1e-3
 """Weakest supply at the command line [V]; no motor moves by less."""
-LONGEST = 1e4
-"""Longest duration at the command line [s]."""
 
 
 def add_motors(parser: argparse.ArgumentParser, *, law: str | None) -> None:

@@ -28,7 +28,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     fitted = "fit these numbers of the robot to the capture first, such as end_inertia,rotor_inertia or com[0,2]"
     add("--calibrate", metavar="NAMES", help=fitted)
     add("--json", action="store_true", help="print one JSON object, with all digits")
-    add("--out", metavar="FIGURE", help="draw measured and simulated angles to a .png, .pdf or .svg")
+    add(
+        "--picture",
+        "--out",
+        dest="out",
+        metavar="FIGURE",
+        help="draw measured and simulated angles to a .png, .pdf or .svg",
+    )
     add_page(parser, "the simulated motion with the measured one as its ghost")
 
 

@@ -39,7 +39,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_free(parser)
     add("--save", metavar="PLAN.json", help="write robot, path, target and certificate, for `reojax simulate --plan`")
     add("--json", action="store_true", help="print one JSON object, with all digits")
-    add("--out", metavar="FIGURE", help="draw the orientation on its way to a .png, .pdf or .svg")
+    add(
+        "--picture",
+        "--out",
+        dest="out",
+        metavar="FIGURE",
+        help="draw the orientation on its way to a .png, .pdf or .svg",
+    )
     add("--animate", metavar="FILM", help="draw the robot on its way to an .mp4 (needs ffmpeg) or a .gif")
     add_page(parser, "the robot on its way")
     add("--csv", metavar="FILE", help="write the corners of the joint path, in degrees, to a .csv")

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 from reojax.cli._arguments import BadInput, version
 from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path
 from reojax.cli._motion import LAW, check_law, motion_of, motion_report, motion_text
-from reojax.cli._motors import add_motors, momentum, seconds
+from reojax.cli._motors import add_motors, momentum
 from reojax.cli._page import add_page, check_page, write_page
+from reojax.cli._planned import add_duration
 
 if TYPE_CHECKING:
     from reojax.motion.simulation import Motion
@@ -24,12 +25,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_manoeuvre(parser)
     add_motors(parser, law=None)
     add = parser.add_argument
-    share = "by the angle that its farthest joint goes"
-    add("--duration", type=seconds, metavar="S", help=f"run it in this time, which the edges share {share}")
-    spin = "angular momentum at the release [kg m^2/s], with --duration; X,Y,Z, or --momentum=-X,Y,Z [0,0,0]"
+    add_duration(parser)
+    spin = "angular momentum at the release [kg m^2/s], with --duration [0,0,0]"
     add("--momentum", type=momentum, metavar="X,Y,Z", help=spin)
     add("--json", action="store_true", help="print one JSON object, with all digits")
-    add("--out", metavar="FIGURE", help="draw orientation and joint angles to a .png, .pdf or .svg")
+    add(
+        "--picture",
+        "--out",
+        dest="out",
+        metavar="FIGURE",
+        help="draw orientation and joint angles to a .png, .pdf or .svg",
+    )
     add_page(parser, "the turn")
 
 

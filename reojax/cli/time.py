@@ -4,6 +4,7 @@ import argparse
 import json
 from typing import TYPE_CHECKING, Any
 
+from reojax._internal.display_units import RPM
 from reojax.cli._arguments import BadInput, version
 from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path
 from reojax.cli._motors import add_motors, motor_at
@@ -19,7 +20,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_manoeuvre(parser)
     add_motors(parser, law="quintic")
     parser.add_argument("--json", action="store_true", help="print one JSON object, with all digits")
-    parser.add_argument("--out", metavar="FIGURE", help="draw the torque-speed picture to a .png, .pdf or .svg")
+    parser.add_argument(
+        "--picture", "--out", dest="out", metavar="FIGURE", help="draw the torque-speed picture to a .png, .pdf or .svg"
+    )
 
 
 def run(args: argparse.Namespace) -> None:
@@ -125,7 +128,7 @@ def _text(report: dict[str, Any], args: argparse.Namespace) -> str:
         lines.append(
             f"  {edge['edge']:<9}{1000 * edge['duration_s']:>9.1f} ms  {edge['joint']:<8}{edge['place']:>5.0%}"
             f"{edge['peak_joint_torque_Nm']:>8.3f} N m{edge['peak_joint_rate_rad_s']:>8.1f} rad/s"
-            f"{edge['peak_motor_speed_rad_s'] * 9.549296585513721:>8.0f} rpm{edge['peak_current_A']:>8.2f} A"
+            f"{edge['peak_motor_speed_rad_s'] * RPM:>8.0f} rpm{edge['peak_current_A']:>8.2f} A"
         )
     verdict = "fits into" if report["fits"] else "does not fit into"
     lines += [

@@ -5,14 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from reojax._internal.display_units import RPM
 from reojax.drawing.colours import ANGLES, DASHES, GREY, INK, JOINTS
 from reojax.mechanics.attitude import tilt_and_roll
 from reojax.motion.motor import Motor
 from reojax.motion.simulation import Motion
 from reojax.plot._style import dress, legend_above
 from reojax.robot import Robot
-
-_RPM = 30 / np.pi
 
 
 def torque_speed_figure(
@@ -45,7 +44,7 @@ def torque_speed_figure(
     for axes, (name, motion) in zip(panels.ravel(), runs, strict=False):
         if motion.motor_torque is None:
             raise ValueError(f"the motion of {name!r} has no motors; give `motors` to `simulate`.")
-        speed, torque = np.asarray(motion.motor_speed) * _RPM, np.asarray(motion.motor_torque) * 1e3
+        speed, torque = np.asarray(motion.motor_speed) * RPM, np.asarray(motion.motor_torque) * 1e3
         for i in shown:
             axes.plot(
                 speed[:, i], torque[:, i], color=JOINTS[i % len(JOINTS)], linewidth=1.8, label=joint_names[i],
@@ -53,14 +52,14 @@ def torque_speed_figure(
             )  # fmt: skip
         widest = max(widest, float(np.abs(speed[:, list(shown)]).max()))
         axes.set_title(name, loc="left", fontsize=10.5, color=INK)
-    reach = 1.12 * max(widest, supply / k * _RPM)
+    reach = 1.12 * max(widest, supply / k * RPM)
     along = np.array([-reach, reach])
     for n, axes in enumerate(panels.ravel()):
         if n >= len(runs):
             axes.set_visible(False)
             continue
         for sign in (1, -1):
-            limit = k * (sign * supply - k * along / _RPM) / resistance * 1e3
+            limit = k * (sign * supply - k * along / RPM) / resistance * 1e3
             label = f"limit at {supply:g} V" if sign > 0 else None
             axes.plot(along, limit, color=INK, linewidth=1.2, linestyle="--", label=label)
         axes.set_xlim(-reach, reach)

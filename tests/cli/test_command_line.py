@@ -99,6 +99,8 @@ def test_every_command_has_help_of_its_own(capsys, command):
     [
         ([], "reojax: the following arguments are required: COMMAND"),
         (["turn"], "reojax: argument COMMAND: invalid choice: 'turn'"),
+        (["simulte"], "reojax: argument COMMAND: invalid choice: 'simulte'"),
+        (["x" * 10**6], "reojax: argument COMMAND: invalid choice: 'xxx"),
         (["simulate", "--manoeuvre", "c"], "reojax simulate: argument --manoeuvre: invalid choice: 'c'"),
         (["simulate", "--twist", "far"], "reojax simulate: argument --twist: 'far' is not a number"),
         (["simulate", "--bend", ""], "reojax simulate: argument --bend: '' is not a number"),
@@ -360,3 +362,19 @@ def test_compiling_quickly_leaves_given_flags_alone(monkeypatch):
     monkeypatch.delenv("XLA_FLAGS")
     session.compile_quickly()
     assert "--xla_backend_optimization_level=0" in os.environ["XLA_FLAGS"].split()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [(["simulte"], "simulate"), (["simulate", "--twst", "3"], "--twist"), (["sweep", "a", "--chunk-sise", "3"], None)],
+)
+def test_what_may_have_been_meant(capsys, arguments, meant):
+    assert main(arguments) == 2
+    complaint = capsys.readouterr().err
+    assert meant is None or complaint.endswith(f"; did you mean {meant}?\n")
+
+
+def test_pictures_have_one_option_everywhere():
+    for command in ("simulate", "time", "compare", "plan", "sweep", "merge"):
+        done = shell(f"reojax {command} --help")
+        assert "--picture" in done.stdout

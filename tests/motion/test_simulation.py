@@ -249,7 +249,7 @@ def test_with_motors_gives_the_robot_the_motors_numbers():
 def test_momentum_at_the_command_line(capsys):
     """It is the library's motion; a spin that the steps do not resolve is refused, as is one without a time."""
     command = ["simulate", "--json", "--duration", "0.8"]
-    assert main([*command, "--momentum=-0.001,0,0.002"]) == 0
+    assert main([*command, "--momentum", "-0.001,0,0.002"]) == 0
     motion = json.loads(capsys.readouterr().out)["motion"]
     path = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
     angles = np.abs(np.diff(path.waypoints, axis=0)).max(axis=1)
