@@ -1,10 +1,12 @@
-"""Hook of MkDocs: pages of the API reference, one for each subject, out of the lists of public names.
+"""Hook of MkDocs: pages of the API reference out of the lists of public names, guides, and the gallery's notebook.
 
 The names come from `reojax/__init__.pyi` and from the `__init__.py` of the public packages, so a new public name is in
 the reference without anybody's doing. Read as text: nothing of reojax is imported.
 """
 
 import ast
+import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -81,13 +83,37 @@ def pages() -> dict[str, str]:
     return written
 
 
+def on_config(config: Any) -> Any:
+    """Add guides that `mkdocs.yml` does not name to the end of its list of guides."""
+    named = str(config["nav"])
+    guides = next(entry["Guides"] for entry in config["nav"] if "Guides" in entry)
+    guides += [page.name for page in sorted((ROOT / "docs").glob("*.md")) if page.name not in named]
+    return config
+
+
 def on_files(files: Any, config: Any) -> Any:
     """Add the pages to those that MkDocs found."""
     from mkdocs.structure.files import File
 
     for path, text in pages().items():
         files.append(File.generated(config, path, content=text))
+    files.append(
+        File.generated(config, "gallery.ipynb", content=notebook((ROOT / "docs" / "gallery.md").read_text("utf-8")))
+    )
     return files
+
+
+def notebook(page: str) -> str:
+    """A page as a Jupyter notebook: its Python blocks as cells, what is between them as text."""
+    cells = []
+    for k, part in enumerate(re.split(r"^```python\n(.*?)^```\n", page, flags=re.DOTALL | re.MULTILINE)):
+        kind = ({"cell_type": "markdown"}, {"cell_type": "code", "outputs": [], "execution_count": None})[k % 2]
+        if part.strip():
+            cells.append({**kind, "id": f"cell-{k}", "metadata": {}, "source": part.strip().splitlines(keepends=True)})
+    kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    return json.dumps(
+        {"nbformat": 4, "nbformat_minor": 5, "metadata": {"kernelspec": kernel}, "cells": cells}, indent=1
+    )
 
 
 def _imported(tree: ast.Module) -> list[tuple[str, str]]:

@@ -3,6 +3,7 @@
 import importlib
 import importlib.util
 import inspect
+import json
 import shutil
 import subprocess
 from pathlib import Path
@@ -30,7 +31,7 @@ def test_every_public_name_has_an_entry():
         inside = importlib.import_module(f"reojax.{module}")
         for name, value in vars(inside).items():
             home = getattr(value, "__module__", "")
-            if name.startswith("_") or inspect.ismodule(value) or not home.startswith("reojax"):
+            if name.startswith("_") or inspect.ismodule(value) or not home.startswith("reojax") or "._" in home:
                 continue
             if f"reojax.{name}" not in NAMES and (module != "so3" or home == "reojax.so3") and callable(value):
                 wanted.add(f"reojax.{module}.{name}")
@@ -51,3 +52,17 @@ def test_the_site_builds_without_a_warning(tmp_path):
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=None)
     assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "site" / "reference" / "mechanics" / "index.html").stat().st_size > 10_000
+
+
+def test_the_gallery_is_a_notebook_too(tmp_path):
+    """Valid by its format, with the page's blocks as cells; that they run is tested where all pages' blocks are."""
+    page = (ROOT / "docs" / "gallery.md").read_text()
+    book = json.loads(reference.notebook(page))
+    code = ["".join(cell["source"]) for cell in book["cells"] if cell["cell_type"] == "code"]
+    assert len(code) == page.count("```python")
+    assert all(compile(text, "cell", "exec") for text in code)
+    assert len({cell["id"] for cell in book["cells"]}) == len(book["cells"])
+    if importlib.util.find_spec("nbformat"):
+        import nbformat
+
+        nbformat.validate(nbformat.reads(json.dumps(book), as_version=4))
