@@ -36,13 +36,14 @@ PAGES = {
     "viewer": ("Viewer and plot", "Pages for a browser, pictures and films.", ("viewer", "drawing", "plot")),
 }
 """Page -> title, a line below it, and the packages whose names are on it."""
-_ENTRY = """## {name}
-
-::: {where}
+_ENTRY = """::: {where}
     options:
-      show_root_heading: false
-      show_root_toc_entry: false
+      heading: {name}
+      toc_label: {name}
+      heading_level: 2
+      show_root_heading: true
 """
+"""Entry of a name, for mkdocstrings."""
 _MODULES = {"so3"}
 """Modules that are public whole."""
 

@@ -35,7 +35,7 @@ def test_every_public_name_has_an_entry():
                 continue
             if f"reojax.{name}" not in NAMES and (module != "so3" or home == "reojax.so3") and callable(value):
                 wanted.add(f"reojax.{module}.{name}")
-    assert not {name for name in wanted if f"## {name}\n" not in entries}
+    assert not {name for name in wanted if f"heading: {name}\n" not in entries}
 
 
 def test_entries_lead_to_what_they_name():
