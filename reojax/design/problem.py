@@ -18,6 +18,7 @@ from reojax.collision.path_clearance import PathClearance, path_clearance
 from reojax.design.loops import Loops
 from reojax.design.variables import Space, Variable
 from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation
+from reojax.optimisation.functions import Functions
 from reojax.optimisation.optimise import Solution, optimise
 from reojax.path import Path
 from reojax.robot import Robot
@@ -134,6 +135,11 @@ class Problem:
             return _concatenate(x, [getattr(loop, kind)(values[loop.variable.name]) for loop in self.loops])
 
         return function
+
+    @property
+    def functions(self) -> Functions:
+        """Cost and constraints as `optimise` takes them: by parts that are differentiated apart."""
+        return Functions(self.cost, self._equality, self._inequality, False)
 
     def equality(self, x: Array) -> Float[Array, " p"]:
         """What must be 0 at a design (n,) in SI: the measures, then the conditions of the loops."""

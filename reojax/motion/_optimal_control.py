@@ -39,7 +39,7 @@ _FINE = 48
 """Steps per piece for the net rotation of the answer."""
 _EXACT = 1e-8
 """Largest error of an answer's net rotation that counts as converged [rad]."""
-_TOLERANCE, _SLOPE = 1e-7, 1e-4
+_TOLERANCE, _SLOPE = 1e-7, 1e-5
 """Of the optimiser: largest violation (rad, and shares of the supply), and slope."""
 _ROUNDING = 1e-12
 """What a joint may be beyond its limit by rounding [rad]."""
