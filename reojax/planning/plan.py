@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -16,7 +17,9 @@ from reojax.mechanics.controllable import controllable_directions
 from reojax.planning import quaternions
 from reojax.planning.candidates import Context, context, join
 from reojax.planning.checks import OBJECTIVES, key_of, robot_and_layout
-from reojax.planning.fewest import cheapest, fewest, rotation_from_folded
+from reojax.planning.clear_boxes import clear_boxes
+from reojax.planning.clear_paths import Clear, check_clearance
+from reojax.planning.fewest import Answer, cheapest, fewest, rotation_from_folded
 from reojax.planning.reach import Reach
 from reojax.planning.result import Plan, first_of, plans
 from reojax.planning.store import Store
@@ -30,6 +33,12 @@ _KEPT = 8
 _WIDEST = 4 * np.pi
 """Largest limit of a joint [rad]. What loops beyond two turns do is not worth the table, and no motor's cables bear it;
 a larger number is mostly one of degrees."""
+_SPARE = 5e-4
+"""Clearance asked for in excess where loops are looked up, so that those between them keep it too [m]."""
+_TOO_NEAR = (
+    "not found: the plan does not keep the clearance, which proves nothing; other limits, less clearance or "
+    "`free_path` may reach it"
+)
 _scenes: Store[Context] = Store(_KEPT)
 
 
@@ -43,6 +52,7 @@ def plan(
     objective: str = "count",
     vocabulary: str = "manoeuvres",
     layout: Layout | None = None,
+    clearance: float | None = None,
     tolerance: float = 1e-9,
 ) -> Plan:
     """Find a sequence of manoeuvres within joint limits after which the base has turned by `target`.
@@ -57,6 +67,8 @@ def plan(
             joint travel that is found with up to `max_manoeuvres` (at most 5).
         vocabulary: "manoeuvres" for A and B; "rectangles" for loops whose distal joints have amplitudes of their own.
         layout: which joints twist, bend and fold; default the robot's own.
+        clearance: least distance between the robot's parts, from 0 up, that is proven to be kept along the whole path
+            [m]; default not asked. Where some loops would come nearer, others are used.
         tolerance: angle to the target that counts as reached [rad].
 
     Returns:
@@ -69,6 +81,7 @@ def plan(
     targets = checks.rotations("target", target, (3, 3))[None]
     limits = {"twist_limit": twist_limit, "bend_limit": bend_limit, "max_manoeuvres": max_manoeuvres}
     choices = {"objective": objective, "vocabulary": vocabulary, "layout": layout, "tolerance": tolerance}
+    choices["clearance"] = clearance
     return first_of(plan_many(robot, targets, **limits, **choices))
 
 
@@ -82,6 +95,7 @@ def plan_many(
     objective: str = "count",
     vocabulary: str = "manoeuvres",
     layout: Layout | None = None,
+    clearance: float | None = None,
     tolerance: float = 1e-9,
     progress: bool = False,
 ) -> Plan:
@@ -98,17 +112,38 @@ def plan_many(
     letters = VOCABULARIES[checks.one_of("vocabulary", vocabulary, tuple(VOCABULARIES))]
     with jax.enable_x64(True):
         robot = jax.tree.map(lambda leaf: np.asarray(leaf, float), robot)
-        here = _scene(robot, layout, letters, twist_limit, bend_limit)
-        wanted = quaternions.from_matrices(targets)
-        seen = rotation_from_folded(here, wanted)
-        parts = []
+        wanted, clear = quaternions.from_matrices(targets), None
+        if clearance is not None:
+            rest = fold_angles(layout)
+            postures = {"the posture at rest": 0 * rest} | ({"the folded posture": rest} if layout.fold else {})
+            clear = Clear(robot, check_clearance(robot, clearance, postures))
         with _bar(wanted.shape[1], progress) as bar:
-            for first in range(0, wanted.shape[1], _BATCH):
-                batch = seen[:, first : first + _BATCH]
-                parts.append(search(here, batch, most, tolerance).rows)
-                bar.update(batch.shape[1])
-        found = plans(here, join(parts), wanted, tolerance)
-        return found if found.converged.all() else _explain(here, found, seen, tolerance)
+            found = _solve(
+                _scene(robot, layout, letters, twist_limit, bend_limit, clear), wanted, search, most, tolerance, bar
+            )
+        return found if clear is None else _prove(found, clear)
+
+
+def _solve(
+    scene: Context, wanted: np.ndarray, search: Callable[..., Answer], most: int, tolerance: float, bar: Any
+) -> Plan:
+    """Plans for targets (4, m) in batches."""
+    seen = rotation_from_folded(scene, wanted)
+    parts = []
+    for first in range(0, wanted.shape[1], _BATCH):
+        batch = seen[:, first : first + _BATCH]
+        parts.append(search(scene, batch, most, tolerance).rows)
+        bar.update(batch.shape[1])
+    found = plans(scene, join(parts), wanted, tolerance)
+    return found if found.converged.all() else _explain(scene, found, seen, tolerance)
+
+
+def _prove(found: Plan, clear: Clear) -> Plan:
+    """Prove the clearance of plans; one that does not keep it is not found."""
+    proven = clear.proven(found.waypoints)
+    kept = proven >= clear.margin
+    status = np.where(kept | ~found.converged, found.status, _TOO_NEAR)
+    return found._replace(clearance=proven, converged=found.converged & kept, status=status)
 
 
 def _limit(entry: str, value: float) -> float:
@@ -143,6 +178,7 @@ def replan(
     objective: str = "count",
     vocabulary: str = "manoeuvres",
     layout: Layout | None = None,
+    clearance: float | None = None,
     tolerance: float = 1e-9,
 ) -> Plan:
     """Plan from a measured orientation: feedback between manoeuvres (thesis 1.9).
@@ -157,6 +193,7 @@ def replan(
         objective: as for `plan`.
         vocabulary: as for `plan`.
         layout: as for `plan`.
+        clearance: as for `plan`.
         tolerance: as for `plan`.
 
     Returns:
@@ -173,14 +210,24 @@ def replan(
         objective=objective,
         vocabulary=vocabulary,
         layout=layout,
+        clearance=clearance,
         tolerance=tolerance,
     )
 
 
-def _scene(robot: Robot, layout: Layout, letters: str, twist_limit: float, bend_limit: float) -> Context:
+def _scene(
+    robot: Robot, layout: Layout, letters: str, twist_limit: float, bend_limit: float, clear: Clear | None
+) -> Context:
     """Compute what plans of one robot within one box share, or find it among the last few."""
+
+    def make() -> Context:
+        box = box_of(robot, layout, letters, twist_limit, bend_limit)
+        if clear is not None:
+            box = clear_boxes(layout, box, clear._replace(margin=clear.margin + _SPARE))
+        return context(robot, layout, box)
+
     key = key_of(robot), layout, letters, twist_limit, bend_limit
-    return _scenes.get(key, lambda: context(robot, layout, box_of(robot, layout, letters, twist_limit, bend_limit)))
+    return _scenes.get((*key, None if clear is None else clear.margin), make)
 
 
 def _bar(total: int, show: bool) -> Any:

@@ -52,3 +52,39 @@ def test_robot_without_shapes_has_no_clearance():
 def test_clearance_is_a_number_from_zero_up(clearance):
     with pytest.raises(ValueError, match="`clearance`"):
         reojax.free_path(PROTOTYPE, PITCH, clearance=clearance)
+
+
+def test_plans_of_manoeuvres_keep_their_clearance():
+    """Half a turn of roll, which the shortest word for strikes: the plan with 5 mm is another, and proven."""
+    roll = np.asarray(so3.exp(np.array([0.0, 0.0, np.pi])))
+    limits = {**BOX, "max_manoeuvres": 5}
+    free = reojax.plan_many(PROTOTYPE, np.stack([roll, np.eye(3)]), **limits)
+    found = reojax.plan_many(PROTOTYPE, np.stack([roll, np.eye(3)]), clearance=0.005, **limits)
+    assert free.clearance is None
+    assert free.converged.all()
+    assert sampled(PROTOTYPE, free.waypoints[0]) < 0.005
+    assert found.converged.all()
+    assert (found.clearance >= 0.005).all()
+    assert sampled(PROTOTYPE, found.waypoints[0]) >= found.clearance[0]
+    assert found.travel[0] >= free.travel[0] - 1e-6
+    one = reojax.plan(PROTOTYPE, roll, clearance=0.005, **limits)
+    assert one.clearance == found.clearance[0]
+
+
+def test_boxes_hold_only_clear_loops():
+    """Random loops within the boxes of each letter keep the clearance, and the boxes are no smaller than they must."""
+    from reojax.planning.clear_boxes import clear_boxes
+    from reojax.planning.clear_paths import Clear
+    from reojax.planning.words import box_of, last_twist, loop_corners
+
+    with jax.enable_x64(True):
+        layout, clear = reojax.layout_of(PROTOTYPE), Clear(PROTOTYPE, 0.005)
+        whole = box_of(PROTOTYPE, layout, "AB", *BOX.values())
+        boxes = clear_boxes(layout, whole, clear)
+        rng = np.random.default_rng(0)
+        letter = rng.integers(len(boxes.letters), size=128)
+        x = rng.uniform(boxes.low[letter], boxes.high[letter]).T
+        loops = loop_corners(layout, *x, last_twist(boxes.letters, letter, x))
+        assert set(boxes.letters) == {"A", "B"}
+        assert clear.kept(loops).mean() > 0.97
+        assert np.isclose(boxes.high, whole.high[0]).any(0).all()
