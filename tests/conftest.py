@@ -9,8 +9,11 @@ from pathlib import Path
 
 import jax
 import pytest
+from helpers import shapes
 
-from reojax.session import compile_quickly
+shapes.install()
+
+from reojax.session import compile_quickly  # noqa: E402
 
 X64 = os.environ.get("REOJAX_TEST_X64", "1") != "0"
 
