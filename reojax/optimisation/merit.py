@@ -19,10 +19,10 @@ def largest_violation(rows: Float[np.ndarray, "*r q"], equalities: int) -> Float
 
 
 def merit(
-    cost: Float[np.ndarray, "*r"],
-    rows: Float[np.ndarray, "*r q"],
-    penalty: Float[np.ndarray, "*r q"],
-    restoring: Bool[np.ndarray, "*r"],
+    cost: Float[np.ndarray, "*#r"],
+    rows: Float[np.ndarray, "*#r q"],
+    penalty: Float[np.ndarray, "*#r q"],
+    restoring: Bool[np.ndarray, "*#r"],
     equalities: int,
 ) -> Float[np.ndarray, "*r"]:
     """Cost and penalised violations; half the sum of their squares where feasibility is being restored."""

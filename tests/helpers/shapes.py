@@ -5,6 +5,7 @@ its result, and of the fields of a named tuple that it returns; names of axes mu
 left to the functions, which take integers for numbers. A call that raises is left alone: that is the door at work.
 """
 
+import contextlib
 import functools
 import importlib.abc
 import importlib.machinery
@@ -53,7 +54,10 @@ def misfits(values: dict[str, Any], hints: dict[str, Any]) -> list[str]:
                     bad.append(f"{name} {np.shape(value)}, annotated {hints[name]}")
             except AnnotationError:  # an axis such as n+1, before n is known
                 later.append(name)
-        bad += [f"{name} {np.shape(values[name])}" for name in later if not fits(values[name], hints[name])]
+        for name in later:
+            with contextlib.suppress(AnnotationError):  # nothing tells how long that axis is
+                if not fits(values[name], hints[name]):
+                    bad.append(f"{name} {np.shape(values[name])}, annotated {hints[name]}")
     return bad
 
 
