@@ -59,9 +59,11 @@ def hold_memory() -> None:
     """Keep freed memory for the next call instead of giving it back to the system (glibc).
 
     XLA asks for its buffers anew at every call; where their pages are fresh each time, some programs take three times
-    as long. What the environment says (`MALLOC_TRIM_THRESHOLD_`, `MALLOC_MMAP_THRESHOLD_`) goes first.
+    as long. What the environment says (`MALLOC_TRIM_THRESHOLD_`, `MALLOC_MMAP_THRESHOLD_`) goes first, and
+    `REOJAX_HOLD_MEMORY=0` leaves the allocator alone. The first net rotation of a process on the CPU calls this.
     """
-    if sys.platform == "linux" and not any(name.startswith("MALLOC_") for name in os.environ):
+    left_alone = os.environ.get("REOJAX_HOLD_MEMORY") == "0" or any(name.startswith("MALLOC_") for name in os.environ)
+    if sys.platform == "linux" and not left_alone:
         mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # musl has none
         if mallopt:
             mallopt(_M_TRIM_THRESHOLD, 2**28)

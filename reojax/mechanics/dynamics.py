@@ -68,7 +68,10 @@ def inverse_dynamics(
     Raises:
         ValueError: if an argument has the wrong shape or is not finite.
     """
-    return joint_load(robot, theta, theta_dot, theta_ddot, momentum=momentum).torque
+    robot, theta, theta_dot, theta_ddot, h = check_motion(
+        robot, theta=theta, theta_dot=theta_dot, theta_ddot=theta_ddot, momentum=_or_zero(momentum)
+    )
+    return joint_load(robot, theta, theta_dot, theta_ddot, momentum=h).torque
 
 
 def joint_load(
@@ -81,30 +84,32 @@ def joint_load(
 ) -> Load:
     """`inverse_dynamics` with what it finds on the way: the rotors' own part, and the base's motion.
 
-    Arguments and errors as for `inverse_dynamics`.
+    Nothing is checked: arrays are finite and of one dtype.
     """
-    robot, theta, theta_dot, theta_ddot, h = check_motion(
-        robot, theta=theta, theta_dot=theta_dot, theta_ddot=theta_ddot, momentum=_or_zero(momentum)
-    )
+    h = jnp.zeros(3, theta.dtype) if momentum is None else momentum
     pose = kinematics(robot, theta)
     A, B = momentum_matrices_of_pose(robot, pose)
+    # angular velocity of the base from the momentum equation, A omega = B theta_dot + h
     omega = solve_symmetric3(A, (B @ theta_dot + h)[:, None])[:, 0]
     # d'Alembert with the base's angular acceleration left out at first: it enters through A and B alone
     turn_rate, turn_acceleration, acceleration = _accelerations(robot, pose, theta_dot, theta_ddot, omega)
-    spin = rotor_spin(robot)
+    spin, stator = rotor_spin(robot), _stator(robot)
     inertia = inertia_in_base_frame(robot, pose)
+    # moment on each link about its centre of mass: I w' + w x I w ...
     twisting = jnp.einsum("iab,ib->ia", inertia, turn_acceleration)
     twisting = twisting + jnp.cross(turn_rate, jnp.einsum("iab,ib->ia", inertia, turn_rate))
-    stator = _stator(robot)
+    # ... and on its stators what changes their rotors' spin momentum J s theta_dot e
     wheel = (robot.rotor_inertia * spin)[:, None] * pose.axis
     turning = theta_ddot[:, None] * wheel + theta_dot[:, None] * jnp.cross(turn_rate[stator], wheel)
     twisting = twisting.at[stator].add(turning)
+    # force on each link: m a
     pushing = robot.mass[:, None] * acceleration
-    torque = jnp.einsum("iak,ia->k", pose.angular_jacobian, twisting) + jnp.einsum(
-        "iak,ia->k", pose.linear_jacobian, pushing
-    )
-    own = robot.rotor_inertia * spin * spin * theta_ddot
-    rotor = own + (wheel * turn_acceleration[stator]).sum(1)
+    # what the joints give of both, by the Jacobians' transposes
+    torque = jnp.einsum("iak,ia->k", pose.angular_jacobian, twisting)
+    torque = torque + jnp.einsum("iak,ia->k", pose.linear_jacobian, pushing)
+    # what spins the rotors up about their axes: J (s^2 theta_ddot + s e . w')
+    rotor = robot.rotor_inertia * spin * spin * theta_ddot + (wheel * turn_acceleration[stator]).sum(1)
+    # nothing turns the robot as a whole: A omega' takes back the moment that is left
     whole = (twisting + jnp.cross(pose.com, pushing)).sum(0)
     omega_dot = -solve_symmetric3(A, whole[:, None])[:, 0]
     return Load(torque + rotor - B.T @ omega_dot, rotor + wheel @ omega_dot, omega, omega_dot)
@@ -133,8 +138,10 @@ def forward_dynamics(
     robot, theta, theta_dot, torque, h = check_motion(
         robot, theta=theta, theta_dot=theta_dot, torque=torque, momentum=_or_zero(momentum)
     )
+    if not robot.joints:
+        return torque
     still = joint_load(robot, theta, theta_dot, jnp.zeros_like(theta), momentum=h).torque
-    return solve_positive(joint_inertia(robot, theta), torque - still) if robot.joints else torque
+    return solve_positive(joint_inertia_of_pose(robot, kinematics(robot, theta)), torque - still)
 
 
 def joint_inertia(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "j j"]:
@@ -146,7 +153,11 @@ def joint_inertia(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "j j"
         ValueError: if `theta` has the wrong shape or is not finite.
     """
     robot, theta = check_motion(robot, theta=theta)
-    pose = kinematics(robot, theta)
+    return joint_inertia_of_pose(robot, kinematics(robot, theta))
+
+
+def joint_inertia_of_pose(robot: Robot, pose: Kinematics) -> Float[Array, "j j"]:
+    """`joint_inertia` where the poses and Jacobians are known already."""
     A, B = momentum_matrices_of_pose(robot, pose)
     return _fixed_base_inertia(robot, pose) - B.T @ solve_symmetric3(A, B)
 
@@ -203,10 +214,11 @@ def _stator(robot: Robot) -> np.ndarray:
 
 def _fixed_base_inertia(robot: Robot, pose: Kinematics) -> Array:
     """`D`: inertia that the joints feel while the base does not turn."""
-    spin, stator = rotor_spin(robot), _stator(robot)
-    jacobian = pose.angular_jacobian
+    spin, stator, jacobian = rotor_spin(robot), _stator(robot), pose.angular_jacobian
+    # links: Ja^T I Ja + m Jl^T Jl
     links = jnp.einsum("iak,iab,ibl->kl", jacobian, inertia_in_base_frame(robot, pose), jacobian)
     links = links + jnp.einsum("i,iak,ial->kl", robot.mass, pose.linear_jacobian, pose.linear_jacobian)
+    # rotors: J s e . w of the stator's link, and J s^2
     carried = jnp.einsum("k,ka,kal->kl", robot.rotor_inertia * spin, pose.axis, jacobian[stator])
     return links + carried + carried.T + jnp.diag(robot.rotor_inertia * spin * spin)
 
@@ -220,7 +232,9 @@ def _accelerations(
     """
     parent, moved = np.array(robot.parent, int), support_mask(robot).astype(omega.dtype)
     w = omega[None] + pose.angular_jacobian @ theta_dot
+    # each joint between adds its acceleration and, carried round by the link before, theta_dot w x e
     w_dot = moved @ (theta_ddot[:, None] * pose.axis + theta_dot[:, None] * jnp.cross(w[parent], pose.axis))
+    # from joint to joint, and on to the centre of mass
     arm = pose.origin[1:] - pose.origin[parent]
     lever = jnp.einsum("iab,ib->ia", pose.rotation, robot.com)
     centre = moved @ _swung(w[parent], w_dot[parent], arm) + _swung(w, w_dot, lever)

@@ -26,8 +26,9 @@ from numpy.typing import ArrayLike
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
 from reojax._internal.linalg import solve_positive
-from reojax.mechanics.dynamics import joint_inertia, joint_load
+from reojax.mechanics.dynamics import joint_inertia, joint_inertia_of_pose, joint_load
 from reojax.mechanics.integrators import RK4, runge_kutta_step
+from reojax.mechanics.kinematics import kinematics
 from reojax.motion.motor import Motor, check_motors, drive, per_joint
 from reojax.motion.trajectory import Trajectory
 from reojax.robot import Robot
@@ -267,7 +268,7 @@ def _acceleration(
     friction = motors.drag * speed + motors.friction * jnp.tanh(speed / _CREEP)
     power = ratio * (_saturate(motors, command, speed) - friction)
     still = joint_load(robot, theta, rate, jnp.zeros_like(theta), momentum=momentum)
-    inertia = joint_inertia(robot, theta)
+    inertia = joint_inertia_of_pose(robot, kinematics(robot, theta))
     rotor = robot.rotor_inertia * ratio**2
     ideal = solve_positive(inertia, power - still.torque)
     driving = (power - rotor * ideal) * rate >= 0

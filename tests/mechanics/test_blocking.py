@@ -1,12 +1,15 @@
 """Batches run in blocks: the same numbers as design by design, for any batch size, and the same derivatives."""
 
+import os
+from types import SimpleNamespace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import reojax
-from reojax import robots
+from reojax import robots, session
 from reojax.mechanics._fast.blocking import _BYTES, Call, in_blocks
 from reojax.mechanics._fast.nodes import NODES as GAUSS_NODES
 
@@ -106,3 +109,19 @@ def test_a_robot_without_data():
     given = jax.jit(jax.value_and_grad(roll, argnums=1))(ones, 1.2)
     np.testing.assert_allclose(known, given, rtol=1e-14)
     assert abs(known[0]) > 0.1
+
+
+@pytest.mark.parametrize(("told", "calls"), [(None, 2), ("0", 0)])
+def test_freed_memory_is_held_from_the_first_program_on(monkeypatch, told, calls):
+    """Two settings of the allocator, unless the environment says to leave it alone."""
+    given = []
+    monkeypatch.setattr(session.sys, "platform", "linux")
+    libc = SimpleNamespace(mallopt=lambda *setting: given.append(setting))
+    monkeypatch.setattr(session.ctypes, "CDLL", lambda _: libc)
+    for name in [name for name in os.environ if name.startswith("MALLOC_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.delenv("REOJAX_HOLD_MEMORY", raising=False)
+    if told:
+        monkeypatch.setenv("REOJAX_HOLD_MEMORY", told)
+    jax.jit(lambda x: in_blocks(Call(lambda _, x: [2 * x], told, ((),), 1), x)[0]).lower(1.0)
+    assert len(given) == calls

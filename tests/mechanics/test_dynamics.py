@@ -138,7 +138,10 @@ def test_torques_differentiate_and_keep_their_dtype():
     many = jax.vmap(lambda push: reojax.inverse_dynamics(robot, theta, rate, push))(jnp.stack([acceleration, 0 * rate]))
     np.testing.assert_allclose(many[0], load(robot, theta, rate, acceleration).torque, rtol=1e-10)
     single = np.float32
-    short = load(robot, single(theta), single(rate), single(acceleration), momentum=single(momentum))
+    short = load(*jax.tree.map(single, (robot, theta, rate, acceleration)), momentum=single(momentum))
+    torque = reojax.inverse_dynamics(robot, single(theta), rate, acceleration, momentum=momentum)
+    np.testing.assert_allclose(torque, short.torque, rtol=1e-4)
+    assert torque.dtype == single
     assert {leaf.dtype for leaf in short} == {np.dtype(single)}
     np.testing.assert_allclose(short.torque, found.torque, rtol=1e-4, atol=1e-5)
 

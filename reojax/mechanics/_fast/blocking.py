@@ -17,6 +17,8 @@ import jax.numpy as jnp
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
+from reojax.session import hold_memory
+
 _BYTES = 2**19
 """Of one intermediate value of a block, where few are alive at once. (Smaller blocks are no faster: XLA splits each
 large operation between two threads, which costs some 30 us.)
@@ -57,6 +59,11 @@ def _whole(*args, call: Call, batched: tuple[bool, ...], size: int | None) -> li
         return list(call.function(call.static, *args))
 
     return one(*args) if size is None else jax.vmap(one, [0 if b else None for b in batched], axis_size=size)(*args)
+
+
+def _on_cpu(*args, **of_call) -> list[jax.Array]:
+    hold_memory()  # for this process, once more does not hurt
+    return _block_by_block(*args, **of_call)
 
 
 def _block_by_block(*args, call: Call, batched: tuple[bool, ...], size: int | None) -> list[jax.Array]:
@@ -162,10 +169,10 @@ def _transpose(cotangents, *args, call: Call, batched: tuple[bool, ...], size: i
 
 _blocks = Primitive("blocks")
 _blocks.multiple_results = True
-_blocks.def_impl(_block_by_block)
+_blocks.def_impl(_on_cpu)
 _blocks.def_abstract_eval(_shapes)
 batching.primitive_batchers[_blocks] = _batch
 ad.primitive_jvps[_blocks] = _jvp
 ad.primitive_transposes[_blocks] = _transpose
 mlir.register_lowering(_blocks, mlir.lower_fun(_whole, multiple_results=True))
-mlir.register_lowering(_blocks, mlir.lower_fun(_block_by_block, multiple_results=True), platform="cpu")
+mlir.register_lowering(_blocks, mlir.lower_fun(_on_cpu, multiple_results=True), platform="cpu")
