@@ -40,7 +40,7 @@ def main(out: Path, *, quick: bool = False) -> dict:
     a, b = (plot.frames_along(robot, path, per_edge=pictures.SAMPLES) for path in (FULL_A, FULL_B))
     draw(grids, a, b, png)
     for name, frames in (("2_5", a), ("2_6", b)):
-        pictures.animation(frames, gif[name], count=4 if quick else 64)
+        pictures.animation(frames, gif[name], count=4 if quick else 36)
 
     sizes = np.geomspace(0.02, 1, 5 if quick else 15)
     errors = {}
