@@ -1,0 +1,79 @@
+"""Turns of 30 degrees about each axis of public robots within joint limits, from the rest posture of their file."""
+
+import sys
+import time
+import warnings
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from common.replay import pinocchio
+from scipy.spatial.transform import Rotation
+
+import reojax
+
+ROBOTS = {
+    "SPART 7-joint arm": ("SPARTpy", "urdf/floating_7dof_manipulator.urdf"),
+    "UR5": ("example-robot-data", "ur_description/urdf/ur5_robot.urdf"),
+    "Panda": ("example-robot-data", "panda_description/urdf/panda.urdf"),
+    "Ant": ("gymnasium", "envs/mujoco/assets/ant.xml"),
+    "Solo12": ("example-robot-data", "solo_description/robots/solo12.urdf"),
+    "Laikago": ("example-robot-data", "laikago_description/urdf/laikago.urdf"),
+    "ANYmal C": ("example-robot-data", "anymal_c_simple_description/urdf/anymal.urdf"),
+    "Gymnasium humanoid": ("gymnasium", "envs/mujoco/assets/humanoid.xml"),
+    "dm_control humanoid": ("dm_control", "suite/humanoid.xml"),
+    "G1, 29 joints": ("example-robot-data", "g1_description/urdf/g1_29dof_rev_1_0.urdf"),
+    "Talos, reduced": ("example-robot-data", "talos_data/robots/talos_reduced.urdf"),
+    "iCub": ("icub-models", "iCubGazeboV2_5/model.urdf"),
+}
+"""Name: package and file. Space arms, arms on a small base, quadrupeds, humanoids."""
+
+_TURN = np.deg2rad(30)
+
+
+def turning(quick: bool) -> dict[str, Any]:
+    """A row for each robot: joints, and over the three axes travel, runs, errors and processor seconds."""
+    rows = [_row(name, *place) for name, place in list(ROBOTS.items())[: 1 if quick else None]]
+    return {"rows": rows, "converged": all(row["reached"] == 3 for row in rows)}
+
+
+def _row(name: str, package: str, file: str) -> dict[str, Any]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        robot = reojax.load_robot(_folder(package) / file, shapes=False)
+    start = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
+    found, seconds = [], []
+    for axis in np.eye(3):
+        target = Rotation.from_rotvec(_TURN * axis).as_matrix()
+        begun = time.process_time()
+        path = reojax.free_path(robot, target, start=start, repeats="least")
+        seconds.append(time.process_time() - begun)
+        assert ((path.waypoints >= robot.lower - 1e-9) & (path.waypoints <= robot.upper + 1e-9)).all()
+        once = pinocchio(robot, path.waypoints)
+        left = np.linalg.matrix_power(once, int(path.repeats)).T @ target
+        found.append((path, Rotation.from_matrix(left).magnitude()))
+    paths = [path for path, _ in found]
+    row = {
+        "robot": name,
+        "joints": robot.joints,
+        "reached": int(sum(path.converged for path in paths)),
+        "runs x, y, z": ", ".join(str(path.repeats) for path in paths),
+        "travel x, y, z [deg]": ", ".join(f"{np.rad2deg(path.travel):.0f}" for path in paths),
+        "largest error [rad]": f"{max(path.error for path in paths):.1e}",
+        "by Pinocchio [rad]": f"{max(error for _, error in found):.1e}",
+        "first [CPU s]": round(seconds[0], 1),
+        "next two [CPU s]": f"{seconds[1]:.1f}, {seconds[2]:.1f}",
+    }
+    print(row, flush=True)
+    return row
+
+
+def _folder(package: str) -> Path:
+    if package == "icub-models":
+        return Path(sys.prefix) / "share/iCub/robots"
+    found = find_spec("numpy" if package == "example-robot-data" else package)
+    if found is None or not found.submodule_search_locations:
+        raise ValueError(f'{package} is not installed: pip install "reojax[zoo]"')
+    here = Path(found.submodule_search_locations[0])
+    return here.parent / "cmeel.prefix/share/example-robot-data/robots" if package == "example-robot-data" else here
