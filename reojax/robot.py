@@ -181,10 +181,11 @@ def make_robot(
     """Build a robot from plain numbers, and refuse what no robot can have.
 
     Args:
-        mass: (n,) link masses [kg], positive.
+        mass: (n,) link masses [kg], not negative.
         com: (n, 3) centres of mass, each in its link's own frame [m].
         inertia: (n, 3, 3) about each centre of mass, in the link's own frame [kg m^2]; symmetric,
-            principal moments positive and none larger than the sum of the other two.
+            no principal moment negative, and none larger than the sum of the other two. Massless links, point
+            masses and thin rods are legal where the whole robot has kinetic energy in every motion of base and joints.
         axis: (j, 3) joint axes, unit length.
         anchor: (j, 3) joint positions in the parent link's frame [m].
         parent: (j,) link each joint hangs from, `parent[k] <= k`; default a serial chain 0, 1, 2, ...

@@ -29,7 +29,9 @@ def table(robot: Any) -> str:
     if not is_concrete(robot) or np.ndim(robot.mass) != 1:
         return one_line(robot)  # traced, or many robots in one
     shapes = [sum(link == i for link in robot.capsule_link) for i in range(robot.links)]
-    rows = [("link", "mass kg", "capsules", "joint", "parent", "limits deg", "gear", "rotor kg m^2", "stator on")]
+    rows: list[tuple[str, ...]] = [
+        ("link", "mass kg", "capsules", "joint", "parent", "limits deg", "gear", "rotor kg m^2", "stator on")
+    ]
     rows.append((robot.link_names[0], _number(robot.mass[0]), str(shapes[0] or ""), *[""] * 6))
     follows = {joint: driver for joint, driver in robot.couplings}
     for k in range(robot.joints):

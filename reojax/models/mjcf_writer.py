@@ -131,17 +131,17 @@ def _bodies(robot: Robot, world: ElementTree.Element, discs: dict) -> list[tuple
                 hinge["range"] = _numbers((max(lower, -1e4), min(upper, 1e4)))
             ElementTree.SubElement(body, "joint", hinge)
             order.append(("joint", joint))
-        mass, inertia = float(robot.mass[link]), robot.inertia[link]
+        mass, com, inertia = float(robot.mass[link]), np.asarray(robot.com[link]), np.asarray(robot.inertia[link])
         own = {k: disc for k, disc in discs.items() if disc[0] == link}
         for _, disc_mass, disc_inertia, _ in own.values():
             mass, inertia = max(mass - disc_mass, 0.0), inertia - disc_inertia
         _check_rest(robot, link, inertia, own)
-        _weigh(body, robot, mass, robot.com[link], inertia)
+        _weigh(body, robot, mass, com, inertia)
         for i, carrier in enumerate(robot.capsule_link):
             if carrier == link:
                 _shape(body, robot, i)
         for k, (_, disc_mass, disc_inertia, _) in own.items():
-            wheel = ElementTree.SubElement(body, "body", name=_rotor(robot, k), pos=_numbers(robot.com[link]))
+            wheel = ElementTree.SubElement(body, "body", name=_rotor(robot, k), pos=_numbers(com))
             ElementTree.SubElement(wheel, "joint", name=_rotor(robot, k), type="hinge", axis=_numbers(robot.axis[k]))
             order.append(("rotor", k))
             _weigh(wheel, robot, disc_mass, np.zeros(3), disc_inertia)

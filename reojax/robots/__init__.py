@@ -6,8 +6,10 @@ from reojax._internal.checks import shorten
 from reojax.robot import Robot
 from reojax.robots.astronaut import astronaut as astronaut
 from reojax.robots.edits import (
+    with_capsules as with_capsules,
     with_end_inertia as with_end_inertia,
     with_gear_ratio as with_gear_ratio,
+    with_limits as with_limits,
     with_rotor_inertia as with_rotor_inertia,
 )
 from reojax.robots.planar import planar as planar

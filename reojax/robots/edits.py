@@ -1,5 +1,7 @@
-"""Changed copies of a robot: the thesis's three design parameters (figures 2.8 and 2.9)."""
+"""Changed copies of a robot: the thesis's three design parameters (figures 2.8 and 2.9), limits and shapes."""
 
+import dataclasses
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
@@ -8,6 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import is_concrete
+from reojax._internal.capsule_checks import check_capsules, check_pairs, default_pairs
+from reojax._internal.checks import index_of, refuse
+from reojax.capsules import Capsule
 from reojax.robot import Robot
 
 
@@ -70,40 +75,95 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
     )
 
 
-def with_gear_ratio(robot: Robot, ratio: ArrayLike) -> Robot:
+def with_gear_ratio(robot: Robot, ratio: ArrayLike | Mapping[str | int, ArrayLike]) -> Robot:
     """Return a copy of any robot with another gear ratio (thesis figure 2.9).
 
     Args:
         robot: the robot.
-        ratio: rotor turns per joint turn, one for all joints or (j,); may be traced.
+        ratio: rotor turns per joint turn, one for all joints or (j,); or joint, by name or number -> ratio, the others
+            as they are. May be traced.
 
     Raises:
-        ValueError: if `ratio` has another shape or is not finite.
+        ValueError: if `ratio` has another shape or is not finite, or names no joint.
     """
-    return robot.replace(gear_ratio=_per_joint(robot, "ratio", ratio))
+    return robot.replace(gear_ratio=_per_joint(robot, "ratio", ratio, robot.gear_ratio))
 
 
-def with_rotor_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
+def with_rotor_inertia(robot: Robot, inertia: ArrayLike | Mapping[str | int, ArrayLike]) -> Robot:
     """Return a copy of any robot with another rotor inertia (thesis figure 2.9).
 
     Only the rotors' spin counts: the links' own inertias stay as they are.
 
     Args:
         robot: the robot.
-        inertia: inertia of a rotor about its spin axis [kg m^2], one for all joints or (j,); may be traced.
+        inertia: inertia of a rotor about its spin axis [kg m^2], one for all joints or (j,); or joint, by name or
+            number -> inertia, the others as they are. May be traced.
 
     Raises:
-        ValueError: if `inertia` has another shape, is negative or not finite.
+        ValueError: if `inertia` has another shape, is negative or not finite, or names no joint.
     """
-    return robot.replace(rotor_inertia=_per_joint(robot, "inertia", inertia, least=0.0))
+    return robot.replace(rotor_inertia=_per_joint(robot, "inertia", inertia, robot.rotor_inertia, least=0.0))
 
 
-def _per_joint(robot: Robot, entry: str, value: ArrayLike, least: float = -np.inf) -> Any:
+def with_limits(
+    robot: Robot,
+    lower: ArrayLike | Mapping[str | int, ArrayLike] | None = None,
+    upper: ArrayLike | Mapping[str | int, ArrayLike] | None = None,
+) -> Robot:
+    """Return a copy of any robot with other joint limits.
+
+    Args:
+        robot: the robot.
+        lower: lower limits [rad], one for all joints or (j,); or joint, by name or number -> limit, the others as they
+            are. Infinite for none; default as they are.
+        upper: upper limits, likewise.
+
+    Raises:
+        ValueError: naming the joint whose limits leave no room; or another shape, or a name that no joint has.
+    """
+    low, high = (
+        present if given is None else _per_joint(robot, entry, given, present, finite=False)
+        for entry, given, present in (("lower", lower, robot.lower), ("upper", upper, robot.upper))
+    )
+    if is_concrete((low, high)):
+        refuse(
+            "lower", np.asarray(low), ~(np.asarray(low) < high), "it must be below `upper`", " rad", robot.joint_names
+        )
+    return robot.replace(lower=low, upper=high)
+
+
+def with_capsules(robot: Robot, capsules: Sequence[Capsule], collision_pairs: Any = None) -> Robot:
+    """Return a copy of any robot with other shapes.
+
+    Args:
+        robot: the robot.
+        capsules: all shapes of its links; links by number or name.
+        collision_pairs: pairs of numbers of capsules that must stay clear; default as `make_robot` chooses them.
+
+    Raises:
+        ValueError: naming the capsule or pair, and the rule it breaks.
+    """
+    shapes = check_capsules(capsules, robot.link_names)
+    if collision_pairs is None:
+        placed = {"parent": robot.parent, "anchor": np.asarray(robot.anchor), **shapes}
+        pairs, _ = default_pairs(placed)
+    else:
+        pairs = check_pairs(collision_pairs, shapes["capsule_link"])
+    return dataclasses.replace(robot, **shapes, collision_pairs=pairs)
+
+
+def _per_joint(
+    robot: Robot, entry: str, value: Any, present: Any, *, least: float = -np.inf, finite: bool = True
+) -> Any:
+    if isinstance(value, Mapping):
+        xp, cast = _like(robot, *value.values())
+        chosen = {index_of(f"a key of {entry}", key, robot.joint_names, "joint"): v for key, v in value.items()}
+        value = xp.stack([cast(chosen.get(k, present[k])) for k in range(robot.joints)])
     xp, cast = _like(robot, value)
     array = cast(value)
     if array.shape not in ((), (robot.joints,)):
         raise ValueError(f"`{entry}` has shape {array.shape}; it must be one number or ({robot.joints},).")
-    if is_concrete(array) and not (np.isfinite(array) & (array >= least)).all():
+    if is_concrete(array) and not ((np.isfinite(array) | (not finite)) & (array >= least)).all():
         rule = "finite" if least == -np.inf else "finite and not negative"
         raise ValueError(f"`{entry}` is {array}; it must be {rule}.")
     return xp.broadcast_to(array, (robot.joints,))
