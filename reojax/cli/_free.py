@@ -53,6 +53,7 @@ def free(robot: "Robot", target: "np.ndarray", args: argparse.Namespace) -> "Fre
         joints=None if args.joints is None else joints(args.joints),
         repeats=1 if args.repeats is None else repeats(args.repeats),
         corners=args.corners,
+        clearance=args.clearance,
         progress=True,
         **limits,
     )

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, degrees, version
+from reojax.cli._clearance import add_clearance
 from reojax.cli._free import add_free, asked, free
 from reojax.cli._page import add_page, check_page, write_page
 from reojax.cli._robot import add_robot, robot_of
@@ -37,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words += " travel, whatever --max-manoeuvres and --objective say [manoeuvres, free for a robot without a layout]"
     add("--vocabulary", choices=("manoeuvres", "rectangles", "free"), help=words)
     add_free(parser)
+    add_clearance(parser, "kept and proven along the whole path")
     add("--save", metavar="PLAN.json", help="write robot, path, target and certificate, for `reojax simulate --plan`")
     add("--json", action="store_true", help="print one JSON object, with all digits")
     add(
@@ -169,6 +171,7 @@ def _plan(robot: "Robot", target: "np.ndarray", args: argparse.Namespace) -> "Pl
         max_manoeuvres=args.max_manoeuvres,
         objective=args.objective,
         vocabulary=args.vocabulary,
+        clearance=args.clearance,
     )
 
 
@@ -221,6 +224,7 @@ def _report(robot: "Robot", plan: "Plan | FreePaths", target: "np.ndarray", args
             "objective": args.objective,
             "vocabulary": args.vocabulary,
             "corners": args.corners,
+            "clearance_m": args.clearance,
         },
         "joints": list(robot.joint_names),
         "target_matrix": target.tolist(),
@@ -236,6 +240,7 @@ def _report(robot: "Robot", plan: "Plan | FreePaths", target: "np.ndarray", args
         "travel_deg": float(np.rad2deg(plan.travel)),
         "converged": bool(plan.converged),
         "status": str(plan.status),
+        "clearance_m": None if plan.clearance is None else float(plan.clearance),
         "picture": args.out if drawn else None,
         "animation": args.animate if drawn else None,
         "page": args.html if drawn else None,
@@ -262,6 +267,8 @@ def _text(report: dict[str, Any]) -> str:
         what = "path" if free else "plan"
         lines.append(f"NOT reached: {report['error_deg']:.4f} deg ({error}) are left; this is the closest {what}")
         lines.append(report["status"])
+    if report["clearance_m"] is not None:
+        lines.append(f"clearance {1e3 * report['clearance_m']:.3f} mm, proven along the whole path")
     files = ("picture", "animation", "page", "csv", "plan")
     lines += [f"{what} in {report[what]}" for what in files if report[what] is not None]
     return "\n".join(lines)

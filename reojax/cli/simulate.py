@@ -2,9 +2,11 @@
 
 import argparse
 import json
+import sys
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, version
+from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
 from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path
 from reojax.cli._motion import LAW, check_law, motion_of, motion_report, motion_text
 from reojax.cli._motors import add_motors, momentum
@@ -28,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_duration(parser)
     spin = "angular momentum at the release [kg m^2/s], with --duration [0,0,0]"
     add("--momentum", type=momentum, metavar="X,Y,Z", help=spin)
+    add_clearance(parser, "proven along the whole path, or exit 1")
     add("--json", action="store_true", help="print one JSON object, with all digits")
     add(
         "--picture",
@@ -52,6 +55,7 @@ def run(args: argparse.Namespace) -> None:
         check_page(args)
         motion = motion_of(robot, path, args)
         report, history = _report(robot, path, args)
+        report["clearance"] = clearance_report(robot, path, args)
         if motion is not None:
             report["motion"] = motion_report(robot, motion, args)
         if args.out is not None:
@@ -60,6 +64,8 @@ def run(args: argparse.Namespace) -> None:
     except ValueError as error:
         raise BadInput(f"reojax simulate: {error}") from error
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(report, args))
+    if report["clearance"] is not None and not report["clearance"]["kept"]:
+        sys.exit(1)
 
 
 def _check_picture(out: str) -> None:
@@ -172,6 +178,8 @@ def _text(report: dict[str, Any], args: argparse.Namespace) -> str:
         lines.append(f"  {label:<19}{figures[key]:>9.1e} {unit:<5}{meaning}")
     if report["joints_beyond_limits"]:
         lines += ["", f"beyond the joint limits of {args.robot}: {', '.join(report['joints_beyond_limits'])}"]
+    if report["clearance"] is not None:
+        lines += clearance_text(report["clearance"])
     if "motion" in report:
         lines += motion_text(report["motion"])
     if report["picture"] is not None:

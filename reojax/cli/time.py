@@ -2,10 +2,12 @@
 
 import argparse
 import json
+import sys
 from typing import TYPE_CHECKING, Any
 
 from reojax._internal.display_units import RPM
 from reojax.cli._arguments import BadInput, version
+from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
 from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path
 from reojax.cli._motors import add_motors, motor_at
 
@@ -19,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `reojax time`."""
     add_manoeuvre(parser)
     add_motors(parser, law="quintic")
+    add_clearance(parser, "proven along the whole path, or exit 1")
     parser.add_argument("--json", action="store_true", help="print one JSON object, with all digits")
     parser.add_argument(
         "--picture", "--out", dest="out", metavar="FIGURE", help="draw the torque-speed picture to a .png, .pdf or .svg"
@@ -39,11 +42,14 @@ def run(args: argparse.Namespace) -> None:
 
             plot.check_picture(args.out)
         report, motion = _report(robot, path, args)
+        report["clearance"] = clearance_report(robot, path, args)
         if args.out is not None and motion is not None:
             _draw(robot, motion, report, args)
     except ValueError as error:
         raise BadInput(f"reojax time: {error}") from error
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(report, args))
+    if report["clearance"] is not None and not report["clearance"]["kept"]:
+        sys.exit(1)
 
 
 def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dict[str, Any], "Motion | None"]:
@@ -138,6 +144,8 @@ def _text(report: dict[str, Any], args: argparse.Namespace) -> str:
         f"{1000 * report['available_s']:.0f} ms.",
         "Peaks are those of the joint that sets the time; at: share of the edge where it does.",
     ]
+    if report["clearance"] is not None:
+        lines += clearance_text(report["clearance"])
     if report["picture"] is not None:
         lines += ["", f"picture in {report['picture']}"]
     return "\n".join(lines)

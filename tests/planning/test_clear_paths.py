@@ -55,19 +55,18 @@ def test_clearance_is_a_number_from_zero_up(clearance):
 
 
 def test_plans_of_manoeuvres_keep_their_clearance():
-    """Half a turn of roll, which the shortest word for strikes: the plan with 5 mm is another, and proven."""
-    roll = np.asarray(so3.exp(np.array([0.0, 0.0, np.pi])))
+    """Pitch by 90 degrees, for which the fewest manoeuvres strike: the plan with 5 mm is another, and proven."""
     limits = {**BOX, "max_manoeuvres": 5}
-    free = reojax.plan_many(PROTOTYPE, np.stack([roll, np.eye(3)]), **limits)
-    found = reojax.plan_many(PROTOTYPE, np.stack([roll, np.eye(3)]), clearance=0.005, **limits)
+    free = reojax.plan_many(PROTOTYPE, np.stack([PITCH, np.eye(3)]), **limits)
+    found = reojax.plan_many(PROTOTYPE, np.stack([PITCH, np.eye(3)]), clearance=0.005, **limits)
     assert free.clearance is None
     assert free.converged.all()
     assert sampled(PROTOTYPE, free.waypoints[0]) < 0.005
     assert found.converged.all()
     assert (found.clearance >= 0.005).all()
     assert sampled(PROTOTYPE, found.waypoints[0]) >= found.clearance[0]
-    assert found.travel[0] >= free.travel[0] - 1e-6
-    one = reojax.plan(PROTOTYPE, roll, clearance=0.005, **limits)
+    assert found.manoeuvres[0] >= free.manoeuvres[0]
+    one = reojax.plan(PROTOTYPE, PITCH, clearance=0.005, **limits)
     assert one.clearance == found.clearance[0]
 
 
