@@ -66,25 +66,34 @@ class Law:
 
         `seen` is an orientation of the base (3, 3) and the time when it was read, if there is one.
         """
-        tau, now, (_, c, filtered, rate, read) = self.tau, at(self.table, time), state[:5]
+        now, (_, steer, filtered, rate, read) = at(self.table, time), state[:5]
         if seen is not None:
             then = at(self.table, seen[1])
             before = np.array([np.interp(seen[1], state.past[:, 0], column) for column in state.past[:, 1:].T])
             own = then["rotation"] @ exp(then["connection"] @ (-then["direction"] @ before))
-            under_way = (then["gramian"] - now["gramian"]) @ (before + filtered) / 2 + now["gramian"] @ c
-            held_back = now["density"] @ (2 * tau * (filtered - c) + tau**2 * rate)
-            left = log(seen[0] @ own.T) - under_way - held_back
-            can = now["gramian"] - 2 * tau * now["density"] + now["rest"] * np.eye(3)
-            worth = 1 - np.exp(-(seen[1] - read) / self.settle)
-            c, read = c + worth * np.linalg.solve(positive(can, float(now["rest"])), left), seen[1]
-            most = np.abs(self.table["direction"][self.table["at"] >= time] @ c).max(initial=0.0)
-            c = c * min(1.0, self.largest / max(most, 1e-12))
-        h = time - state.time
-        gap, decay = filtered - c, np.exp(-h / tau)
-        slope = rate + gap / tau
-        filtered, rate = c + (gap + h * slope) * decay, (rate - h / tau * slope) * decay
+            since = (then["gramian"] - now["gramian"]) @ (before + filtered) / 2
+            error, worth = log(seen[0] @ own.T) - since, 1 - np.exp(-(seen[1] - read) / self.settle)
+            later, read = self.table["direction"][self.table["at"] >= time], seen[1]
+            steer = corrected(now, later, steer, filtered, rate, error, worth, self.tau, self.largest)
+        filtered, rate = smooth(steer, filtered, rate, time - state.time, self.tau)
         past = np.vstack([state.past[1:], [time, *filtered]])
-        return State(time, c, filtered, rate, read, past), now["theta"] - now["direction"] @ filtered
+        return State(time, steer, filtered, rate, read, past), now["theta"] - now["direction"] @ filtered
+
+
+def corrected(now, later, steer, filtered, rate, error, worth, tau, largest):
+    """Steering vector with what is left of `error`, now, that the changes under way do not take back."""
+    held_back = now["density"] @ (2 * tau * (filtered - steer) + tau**2 * rate)
+    left = error - now["gramian"] @ steer - held_back
+    can = now["gramian"] - 2 * tau * now["density"] + now["rest"] * np.eye(3)
+    steer = steer + worth * np.linalg.solve(positive(can, now["rest"]), left)
+    return steer * min(1.0, largest / max(np.abs(later @ steer).max(initial=0.0), 1e-12))
+
+
+def smooth(steer, filtered, rate, step, tau):
+    """The filter of second order, `step` later, exactly."""
+    gap, decay = filtered - steer, np.exp(-step / tau)
+    slope = rate + gap / tau
+    return steer + (gap + step * slope) * decay, (rate - step / tau * slope) * decay
 
 
 def at(table: Mapping[str, np.ndarray], time: float) -> dict[str, np.ndarray]:
