@@ -40,7 +40,9 @@ from reojax.planning.plan import plan, plan_many, replan
 from reojax.planning.plan_file import SavedPlan, load_plan, save_plan
 from reojax.planning.result import Plan
 from reojax.robot import Robot, layout_of, make_robot
+from reojax.steering.feedback import Reading as Reading, References as References, Steering as Steering
 from reojax.steering.gains import CorrectionGains as CorrectionGains, correction_gains as correction_gains
+from reojax.steering.righting import Righting as Righting, righting as righting, righting_many as righting_many
 from reojax.steering.tables import write_gains as write_gains
 from reojax.sweeps.grid import zipped
 from reojax.sweeps.merge import merge
@@ -121,11 +123,16 @@ __all__ = [
     "RE_MAX_17",
     "read_capture",
     "Release",
+    "Reading",
+    "References",
     "release_spread",
     "Released",
     "released",
     "ReleaseSpread",
     "replan",
+    "righting",
+    "Righting",
+    "righting_many",
     "Robot",
     "robots",
     "rotation_history",
@@ -137,6 +144,7 @@ __all__ = [
     "SIX_BODY",
     "so3",
     "stall_torque",
+    "Steering",
     "Sweep",
     "sweep",
     "through",

@@ -1,4 +1,4 @@
-"""A fall in closed loop, with everything that may be wrong; the truth is integrated apart from the estimator's model."""
+"""A fall in closed loop, with everything that may be wrong; the truth is integrated apart from the estimator."""
 
 from collections.abc import Callable
 from functools import partial
@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from common.types import Array
 
 import reojax
-from common.types import Array
 from reojax import so3
 from reojax.steering.feedback import Reading, SteeringLaw
 

@@ -35,8 +35,8 @@ from reojax.steering.tables import gain_table
 
 _MEMORY = 64
 """Joint readings that are remembered."""
-_SUBSTEPS = 3
-"""Steps of the integration from one reading to the next."""
+_LONGEST = 4e-3
+"""Longest step of the integration from one reading to the next [s]."""
 
 
 class Reading(NamedTuple):
@@ -184,11 +184,11 @@ def Steering(
     parameters_std: Sequence[float] = (),
     wander: float = 1e-3,
     tau: float = 5e-3,
-    settle: float = 1e-2,
-    largest: float = 0.3,
+    settle: float = 3e-2,
+    largest: float = 0.6,
     samples: int = 32,
     weights: ArrayLike | None = None,
-    left: float = 0.1,
+    left: float = 1.0,
 ) -> SteeringLaw:
     """Estimator and corrector of one motion: readings in, joint angles out, all state explicit.
 
@@ -364,7 +364,8 @@ def _along(
     spread: bool,
 ) -> _Estimate:
     """The estimate at `end`, along the joints as they were read, with its covariance if `spread`."""
-    h = (end - begin) / _SUBSTEPS
+    count = jnp.maximum(jnp.ceil((end - begin) / _LONGEST - 1e-6), 1)
+    h = (end - begin) / count
     size = 7 + len(law.parameters)
 
     def joints(t: Array) -> Array:
@@ -397,7 +398,7 @@ def _along(
             covariance = covariance.at[np.arange(3), np.arange(3)].add(h * law.wander**2)
         return _Estimate(at.rotation @ so3.exp(turn), momentum, covariance)
 
-    return jax.lax.fori_loop(0, _SUBSTEPS, step, at)
+    return jax.lax.fori_loop(0, count.astype(int), step, at)
 
 
 def _rate(robot: Robot, theta: Array, rate: Array, rotation: Array, momentum: Array) -> Array:

@@ -117,7 +117,8 @@ def correction_gains(
         samples: of each edge or piece, static.
         weights: (j,) price of changing each joint, positive; infinite for one that must not. Default 1.
         window: share of the whole, at its start and at its end, over which the change starts and ends smoothly.
-        left: share of an error that may be left at the end, about the axis that is hardest to turn about.
+        left: `rest` in shares of the authority at the start: about the share of an error that is left at the end, about
+            the axis that is hardest to turn about. The more, the smaller the changes.
         momentum: (3,) angular momentum, inertial frame, of a trajectory [kg m^2/s]; default zero.
 
     Raises:
@@ -151,8 +152,8 @@ def _check(robot: Robot, motion: Path | Trajectory | Motion, samples: int, windo
         raise ValueError(f"`samples` is {samples!r}; it must be an integer, at least 2.")
     if not (isinstance(window, int | float) and 0 <= window <= 0.5):
         raise ValueError(f"`window` is {window!r}; it must be a share from 0 to 0.5.")
-    if not (isinstance(left, int | float) and 0 < left < 1):
-        raise ValueError(f"`left` is {left!r}; it must be a share between 0 and 1.")
+    if not (isinstance(left, int | float) and np.isfinite(left) and left > 0):
+        raise ValueError(f"`left` is {left!r}; it must be positive.")
 
 
 @partial(jax.jit, static_argnums=5)

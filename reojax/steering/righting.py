@@ -1,9 +1,9 @@
 """Aerial righting: joint motions that turn a robot that already has angular momentum, in the time of its fall.
 
 With angular momentum `H` the turn depends on the time as well as on the path, `R' = R hat(A^-1 (B theta' + R^T H))`
-(thesis 1.9; a cat dropped upside down, or one that already spins). The joints go along a spline of least
-jerk, at rest at both ends; its points are found by Newton steps of least effort that end on the target, with multipliers for
-what the joints' limits, the motors and the clearance allow. Many starts run side by side.
+(thesis 1.9; a cat dropped upside down, or one that already spins). The joints go along a spline of least jerk, at rest
+at both ends; its points are found by Newton steps of little effort that end on the target, with multipliers for what
+the joints' limits, the motors and the clearance allow. Several starts run side by side.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ _SETTLED = 0.1
 """Change of the points [rad] below which effort goes down no more."""
 _FEASIBLE = 1e-4
 """How far a limit may be passed: rad, share of the supply, or m."""
-_SOFT = 1e-3
-"""Power over which driving turns into being driven back, in shares of the largest that the motors have."""
+_SOFT = 0.02
+"""Power over which driving turns into being driven back [W]."""
 _FASTEST = 100.0
 """Body rate that a momentum may imply [rad/s]; more is a wrong unit."""
 _TURNS = 20.0
@@ -298,6 +298,7 @@ def _search(task: _Task, goals, momenta, durations, *, pieces, starts, tolerance
     fine = basis(pieces, _EXACT_STEPS).nodes[:, 0] @ points
     travel = np.abs(np.diff(fine, axis=1)).sum((1, 2))
     nothing = np.full(m, np.nan)
+    margin = nothing if task.motors is None else margin
     return Righting(points, durations, momenta, rotation, omega, error, beyond, margin, effort, travel, good, status,
                     steps, nothing)  # fmt: skip
 
@@ -430,8 +431,7 @@ def _solve_one(task: _Task, pieces: int, max_steps: int, points, goal, momentum,
         parts = [theta]
         if task.motors is not None:
             load = joint_load(robot, theta, rate, acceleration, momentum=h)
-            power = (task.motors.supply**2 / task.motors.resistance).max()
-            squared, linear, constant = demand(robot, task.motors, rate, load, soft=_SOFT * power)
+            squared, linear, constant = demand(robot, task.motors, rate, load, soft=_SOFT)
             parts.append((squared + linear.sum(0) + constant) / task.motors.supply)
         if task.clearance is not None:
             parts.append(clearances(robot, theta))
@@ -520,7 +520,7 @@ def _solve_one(task: _Task, pieces: int, max_steps: int, points, goal, momentum,
     value = jax.vmap(limited)(state)
     beyond = jnp.abs(value - jnp.clip(value, low, high)).max()
     volts = value[:, robot.joints : 2 * robot.joints] if task.motors is not None else None
-    margin = jnp.full((), jnp.nan) if volts is None else 1 - jnp.abs(volts).max()
+    margin = jnp.zeros((), dtype) if volts is None else 1 - jnp.abs(volts).max()
     omega = solve_symmetric3(momentum_matrices(robot, points[-1])[0], (rotation.T @ momentum)[:, None])[:, 0]
     acceleration = jnp.asarray(own.nodes[:, 2], dtype) @ points / duration**2
     effort = (jnp.asarray(own.weights, dtype)[:, None] * acceleration**2 * task.weights[None]).sum()

@@ -225,7 +225,7 @@ def test_the_onboard_law_takes_an_error_back(lag):
         ({"weights": [1, -1, 1]}, "positive"),
         ({"weights": [1, 1]}, "3 joints"),
         ({"window": 0.7}, "0 to 0.5"),
-        ({"left": 0}, "between 0 and 1"),
+        ({"left": 0}, "positive"),
         ({"samples": 1}, "at least 2"),
         ({"momentum": [0, 0, 1]}, "trajectory"),
         ({"motion": reojax.polygon([[0.0, 0, 0]])}, "one waypoint"),
