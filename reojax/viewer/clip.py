@@ -53,7 +53,8 @@ def clip_of(robot: Robot, motion: Any, *, entry: str = "motion", certificate: bo
 
     Args:
         robot: the robot that moves.
-        motion: a `Path`, `Plan` or `FreePaths` of one target, a `Trajectory`, or a `Motion`, `Tracking`, `Sampled`, ...
+        motion: a `Path`, `Plan` or `FreePaths` of one target, a `Trajectory` or `Fastest`, or a `Motion`, `Tracking`,
+            `Sampled`, ...
         entry: what a message calls it.
         certificate: whether to measure the certificate of a path; default if it has at most 48 edges.
 
@@ -67,6 +68,8 @@ def clip_of(robot: Robot, motion: Any, *, entry: str = "motion", certificate: bo
         if corners.ndim != 2:
             raise ValueError(f"`{entry}` holds paths to many targets; show one at a time, such as its waypoints[0].")
         return _along(robot, polygon(corners), entry, certificate)
+    if isinstance(getattr(motion, "trajectory", None), Trajectory):  # of `fastest_loop`, `overlap`, `free_law`
+        motion = motion.trajectory
     if isinstance(motion, Trajectory):
         _check_joints(robot, motion.joints, entry)
         motion = simulate(robot, motion)
@@ -120,7 +123,10 @@ def _along(robot: Robot, path: Path, entry: str, certified: bool | None) -> Clip
         notes = (f"The certificate of a path of {path.edges} edges was not measured (ask with certificate=True).",)
     samples = int(np.clip(MOST // path.edges, 1, _PER_EDGE))
     finer = -(-DEFAULT_STEPS // samples) if path.edges <= MOST else 1
-    rotation = np.asarray(rotation_history(robot, path, samples=samples * finer), float)[::finer]
+    history = np.asarray(rotation_history(robot, path, samples=samples * finer))
+    if history.dtype == np.float32:
+        notes = (*notes, "Computed in single precision (float32): angles are known to some 1e-6 rad.")
+    rotation = history.astype(float)[::finer]
     clock = np.arange(len(rotation)) / samples
     theta = np.stack([np.interp(clock, np.arange(len(corners)), angle) for angle in corners.T], axis=1)
     clip = Clip(clock, theta, rotation, False, np.arange(len(corners), dtype=float), travel, certificate, notes=notes)

@@ -54,8 +54,8 @@ def view(
     Args:
         robot: the robot.
         motion: what it does: a `Path` or a `Plan` (the clock counts edges then, as there is no time in them), a
-            `Trajectory`, anything that holds `time`, `theta` and `rotation` such as a `Motion`, or a `Comparison`,
-            whose measured motion becomes the ghost of the simulated one.
+            `Trajectory` or what holds one (`Fastest`), anything that holds `time`, `theta` and `rotation` such as a
+            `Motion`, or a `Comparison`, whose measured motion becomes the ghost of the simulated one.
         file: where to, a name that ends in .html.
         target: (3, 3) orientation of the base that is wanted, base components to inertial ones.
         beside: another motion, shown on the right on the same clock, which must be of the same kind.

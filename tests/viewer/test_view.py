@@ -2,6 +2,7 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -52,6 +53,8 @@ def test_thousands_of_corners_are_thinned_and_it_is_said(tmp_path):
 def test_plans_and_trajectories_are_motions(tmp_path):
     trajectory = reojax.along(LOOP, "quintic", np.full(4, 0.1))
     assert data_of(reojax.view(PROTOTYPE, trajectory, tmp_path / "a.html"))["timed"]
+    fastest = SimpleNamespace(trajectory=trajectory)  # as `Fastest` holds it
+    assert data_of(reojax.view(PROTOTYPE, fastest, tmp_path / "c.html"))["timed"]
     target = np.asarray(reojax.net_rotation(PROTOTYPE, LOOP))
     plan = reojax.plan(PROTOTYPE, target, twist_limit=4.8, bend_limit=2.2, max_manoeuvres=2)
     data = data_of(reojax.view(PROTOTYPE, plan, tmp_path / "b.html", target=target))
@@ -110,3 +113,10 @@ def test_refusals(words, tmp_path):
     with pytest.raises(ValueError, match=re.escape(words)):
         reojax.view(given.pop("robot"), given.pop("motion"), tmp_path / given.pop("file"), **given)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_single_precision_is_said(tmp_path):
+    """Numbers of float32 look like others on a page, so the page says what they are."""
+    path = reojax.polygon(np.asarray(LOOP.waypoints, np.float32))
+    data = data_of(reojax.view(PROTOTYPE, path, tmp_path / "a.html"))
+    assert any("float32" in note for note in data["notes"])
