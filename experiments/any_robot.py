@@ -12,7 +12,7 @@ from pathlib import Path
 
 from common.script import options, run
 
-PARTS = ("loading",)
+PARTS = ("loading", "turning", "random_targets")
 """Modules of `any_robot_parts`, each with a function of its own name."""
 
 

@@ -45,7 +45,7 @@ def main(out: Path, *, quick: bool = False) -> dict:
     """Plan, replay, print the table, write `free_paths.json` and `.png` to `out`, and return the numbers."""
     table, picture = check_writable(out / "free_paths.json"), check_writable(out / "free_paths.png")
     targets = random_targets(4 if quick else 200, quick)
-    most, starts = (2, 4) if quick else (5, 8)
+    most, starts = (2, 4) if quick else (5, 4)
     words = reojax.plan_many(ROBOT, targets, **LIMITS, max_manoeuvres=most, objective="travel", progress=not quick)
     rows, largest, begun = [], 0.0, time.perf_counter()
     for first in tqdm(range(0, len(targets), AT_ONCE), desc="groups of targets", disable=quick):

@@ -77,7 +77,7 @@ def free_path(
     bend_limit: float | None = None,
     layout: Layout | None = None,
     corners: int | None = None,
-    starts: int = 8,
+    starts: int = 4,
     tolerance: float = 1e-9,
     max_steps: int = 100,
     seed: int = 0,
@@ -127,7 +127,7 @@ def free_paths(
     bend_limit: float | None = None,
     layout: Layout | None = None,
     corners: int | None = None,
-    starts: int = 8,
+    starts: int = 4,
     tolerance: float = 1e-9,
     max_steps: int = 100,
     seed: int = 0,
@@ -158,7 +158,7 @@ def free_paths(
         layout: which joints twist, bend and fold, for these two limits; default the robot's own.
         corners: number of free corners, at least 2; more find less travel and take longer. Default 8 for up to 4
             moving joints, 6 for up to 8, else 5.
-        starts: polygons to start from for each target; up to three times as many if it is not reached.
+        starts: polygons to start from for each target; up to six times as many if it is not reached.
         tolerance: angle to the target that counts as reached [rad].
         max_steps: most steps of the solver.
         seed: of the random polygons.

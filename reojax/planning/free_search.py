@@ -22,7 +22,7 @@ from reojax.planning.polygon_table import PolygonTable
 
 _ROWS = 32
 """Polygons solved side by side: one shape, one program."""
-_ROUNDS = 3
+_ROUNDS = 6
 """How often starts are tried for targets that are not reached."""
 _FINALISTS = 2
 """Polygons of each target that are improved to the end."""
