@@ -7,6 +7,7 @@ Expected: after bend, twist, unbend, untwist the joints are where they were, and
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from common.script import options, run
@@ -24,7 +25,7 @@ PER_EDGE = 2
 SIZE, ABOVE = (12.6, 4.7), 0.365
 """Of the picture [inch], and the share of its height that the poses take."""
 INK, ROLL = "#222222", "#d55e00"
-CENTRED = {"ha": "center", "va": "center"}
+CENTRED: dict[str, Any] = {"ha": "center", "va": "center"}
 AXES = (("x", "#009e73"), ("y", "#cc79a7"))
 """The base's axes that show a roll, and their colours."""
 
@@ -75,9 +76,17 @@ def _poses(axes: Axes, robot: reojax.Robot, path: reojax.Path, history: np.ndarr
         for column, (name, colour) in enumerate(AXES):
             seen = camera @ rotation[:, column]
             tip = at + 0.085 * scale * seen[:2]
-            style = {"arrowstyle": "-|>", "mutation_scale": 11, "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0}
-            axes.add_patch(FancyArrowPatch(at, tip, color=colour, zorder=3 if seen[2] > 0 else 1, **style))
-            axes.text(*(at + 1.18 * (tip - at)), name, color=colour, fontsize=11, fontweight="bold", **CENTRED)
+            style: dict[str, Any] = {
+                "arrowstyle": "-|>",
+                "mutation_scale": 11,
+                "linewidth": 2.2,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            }
+            ends = tuple(at), tuple(tip)
+            axes.add_patch(FancyArrowPatch(*ends, color=colour, zorder=3 if seen[2] > 0 else 1, **style))
+            x, y = at + 1.18 * (tip - at)
+            axes.text(x, y, name, color=colour, fontsize=11, fontweight="bold", **CENTRED)
         plot.draw_robot_flat(axes, robot, theta, rotation, at=(at[0], at[1]), scale=scale)
         axes.text(at[0], -0.3, f"{roll[k * step]:.0f}°", color=ROLL, fontsize=12, **CENTRED)
     axes.text(-0.24, -0.3, "roll", ha="right", va="center", fontsize=12, color=ROLL)
