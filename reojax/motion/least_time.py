@@ -19,6 +19,7 @@ from jaxtyping import Float, Int
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array, common_float, is_concrete
+from reojax.collision.refusal import require_clearance
 from reojax.mechanics.dynamics import joint_load
 from reojax.motion.motor import Motor, check_motors, demand, per_joint
 from reojax.motion.time_laws import Law, check_law
@@ -58,6 +59,7 @@ def minimum_time(
     law: Law | str = "quintic",
     *,
     samples: int = DEFAULT_SAMPLES,
+    clearance: float | None = None,
 ) -> LeastTime:
     """Shortest duration of each edge with every motor within its torque-speed curve at every instant.
 
@@ -70,13 +72,17 @@ def minimum_time(
         motors: motors of the joints, one for all or one for each.
         law: the time law of every edge, or its name.
         samples: instants per piece of the law, static.
+        clearance: least distance between the robot's parts that the path must keep all along [m]; default not asked.
 
     Raises:
         ValueError: if anything does not fit the robot, or a supply cannot move its motor at all: it does not
-            overcome the friction, so that no time is long enough.
+            overcome the friction, so that no time is long enough;
+            or the path does not keep the clearance, which is said with the pair and the place.
     """
     checks.instance("robot", robot, Robot, "`make_robot` makes")
     motors = _able(motors, robot)
+    if clearance is not None:
+        require_clearance(robot, path, clearance)
     law = check_law(law)
     trajectory = along(path, law, 1.0)
     _check_fit(robot, trajectory)
