@@ -50,10 +50,9 @@ def _row(name: str, package: str, file: str) -> dict[str, Any]:
         path = reojax.free_path(robot, target, start=start, repeats="least")
         seconds.append(time.process_time() - begun)
         assert ((path.waypoints >= robot.lower - 1e-9) & (path.waypoints <= robot.upper + 1e-9)).all()
-        once = pinocchio(robot, path.waypoints)
-        left = np.linalg.matrix_power(once, int(path.repeats)).T @ target
-        found.append((path, Rotation.from_matrix(left).magnitude()))
+        found.append((path, _left(robot, path, target)))
     paths = [path for path, _ in found]
+    errors = [error for _, error in found if error is not None]
     row = {
         "robot": name,
         "joints": robot.joints,
@@ -61,12 +60,21 @@ def _row(name: str, package: str, file: str) -> dict[str, Any]:
         "runs x, y, z": ", ".join(str(path.repeats) for path in paths),
         "travel x, y, z [deg]": ", ".join(f"{np.rad2deg(path.travel):.0f}" for path in paths),
         "largest error [rad]": f"{max(path.error for path in paths):.1e}",
-        "by Pinocchio [rad]": f"{max(error for _, error in found):.1e}",
+        "by Pinocchio [rad]": f"{max(errors):.1e}" if errors else "refused",
         "first [CPU s]": round(seconds[0], 1),
         "next two [CPU s]": f"{seconds[1]:.1f}, {seconds[2]:.1f}",
     }
     print(row, flush=True)
     return row
+
+
+def _left(robot: reojax.Robot, path: reojax.FreePaths, target: np.ndarray) -> float | None:
+    """Angle to the target after a replay by Pinocchio [rad]; None where it refuses a link lighter than its rotor."""
+    try:
+        once = pinocchio(robot, path.waypoints)
+    except RuntimeError:
+        return None
+    return Rotation.from_matrix(np.linalg.matrix_power(once, int(path.repeats)).T @ target).magnitude()
 
 
 def _folder(package: str) -> Path:
