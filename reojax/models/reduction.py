@@ -13,8 +13,8 @@ import numpy as np
 from reojax._internal.checks import shorten
 from reojax._internal.definiteness import turn_about
 from reojax.models.description import Description, JointEntry, Shape, ball_as_hinges
-
-MOVING = ("revolute", "continuous")
+from reojax.models.locking import check_constraints, couple, drop_world, held_joints, hold_what_carries_nothing
+from reojax.models.motors import motors
 
 
 class Reduced(NamedTuple):
@@ -58,12 +58,12 @@ def reduce(
         listed = shorten(", ".join(description.links))
         raise ValueError(f"`base` is {shorten(base)}; the links are {listed}")
     joints = dict(description.joints)
-    root = _drop_world(description, joints, lock, base, notes)
-    held = _held(joints, lock, notes)
-    couplings, held = _couplings(joints, held, lock, notes)
-    _hold_what_carries_nothing(description, joints, held, couplings, base or root, notes)
+    root = drop_world(description, joints, lock, base, notes)
+    held = held_joints(joints, lock, notes)
+    couplings, held = couple(joints, held, lock, notes)
+    hold_what_carries_nothing(description, joints, held, couplings, base or root, notes)
     group = _groups(description, joints, held, root, notes)
-    _check_constraints(description, joints, held, group, notes)
+    check_constraints(description, joints, held, group, notes)
     pose = _poses(joints, held, root)
     base_link = root if base is None else base
     if base_link not in pose:
@@ -94,125 +94,6 @@ def _known(description: Description) -> str:
     return f"the joints are {shorten(', '.join(description.joints))}" if description.joints else "there are no joints"
 
 
-def _drop_world(
-    description: Description, joints: dict[str, JointEntry], lock: Mapping[str, float], base: str | None, notes: list
-) -> str:
-    """Drop what ties the robot to a world: links without mass at the root, down to the first joint that stays."""
-    root = description.root
-    while True:
-        fixed, front = {root}, [root]
-        while front:  # all that is fixed to the root
-            link = front.pop()
-            for joint in joints.values():
-                if joint.parent == link and joint.kind == "fixed" and joint.child not in fixed:
-                    fixed.add(joint.child)
-                    front.append(joint.child)
-        leaving = [n for n, joint in joints.items() if joint.parent in fixed and joint.kind != "fixed"]
-        mass = sum(description.links[link].mass for link in fixed)
-        if mass > 0 or len(leaving) != 1 or leaving[0] in lock or (base is not None and base in fixed):
-            break
-        (name,) = leaving
-        root = joints[name].child
-        notes.append(
-            f"dropped at the root: joint {shorten(name)} ({joints[name].kind}) and what is above it, without mass; "
-            f"the base is {shorten(root)}"
-        )
-        for other in [n for n, joint in joints.items() if joint.parent in fixed]:
-            del joints[other]
-    return root
-
-
-def _held(joints: dict[str, JointEntry], lock: Mapping[str, float], notes: list[str]) -> dict[str, float]:
-    """Positions of the joints that do not move."""
-    held: dict[str, float] = {}
-    for name, joint in joints.items():
-        if name in lock:
-            value = lock[name]
-            if isinstance(value, bool | str) or not np.isreal(value) or not np.isfinite(value):
-                raise ValueError(f"`lock[{shorten(name)}]` is {shorten(value)}; it must be a finite number")
-            value = float(value)
-            if joint.kind in ("floating", "planar", "ball", "fixed") and value:
-                raise ValueError(f"`lock[{shorten(name)}]` is {value}; a {joint.kind} joint is held at 0 only")
-            if not joint.lower <= value <= joint.upper:
-                raise ValueError(
-                    f"`lock[{shorten(name)}]` is {value}; the joint's limits are {joint.lower:g} to {joint.upper:g}"
-                )
-            held[name] = value
-            notes.append(f"locked: joint {shorten(name)} at {value!r}")
-        elif joint.kind == "fixed":
-            held[name] = 0.0
-        elif joint.kind == "prismatic":
-            held[name] = joint.rest
-            notes.append(f"locked: prismatic joint {shorten(name)} at {joint.rest!r} m")
-        elif joint.kind not in MOVING:
-            raise ValueError(
-                f"joint {shorten(name)} is {joint.kind}; only revolute ones move: lock={{{name!r:.60}: 0}} holds it"
-            )
-    return held
-
-
-def _couplings(
-    joints: dict[str, JointEntry], held: dict[str, float], lock: Mapping[str, float], notes: list[str]
-) -> tuple[dict[str, tuple[str, float, float]], dict[str, float]]:
-    """Followers with drivers that follow none, chains composed; followers of held joints are held too."""
-    held = dict(held)
-    couplings: dict[str, tuple[str, float, float]] = {}
-    for name, joint in joints.items():
-        if joint.mimic is None or joint.kind == "fixed" or name in lock:
-            continue
-        driver, ratio, offset = joint.mimic
-        if driver not in joints:
-            raise ValueError(f"joint {shorten(name)} mimics {shorten(driver)}, which is not there")
-        seen = {name}
-        while driver in joints and driver not in lock and joints[driver].mimic is not None:
-            if driver in seen:
-                raise ValueError(f"joint {shorten(name)} mimics itself, by way of {shorten(driver)}")
-            seen.add(driver)
-            further = joints[driver].mimic
-            assert further is not None
-            driver, ratio, offset = further[0], ratio * further[1], ratio * further[2] + offset
-        if driver in seen:
-            raise ValueError(f"joint {shorten(name)} mimics itself, by way of {shorten(driver)}")
-        if driver in held:
-            held[name] = ratio * held[driver] + offset
-            notes.append(f"locked: joint {shorten(name)} at {held[name]!r}, which follows {shorten(driver)}")
-        elif name not in held:
-            couplings[name] = (driver, ratio, offset)
-            notes.append(f"coupled: joint {shorten(name)} = {ratio:g} * {shorten(driver)} + {offset:g} rad")
-    return couplings, held
-
-
-def _hold_what_carries_nothing(
-    description: Description,
-    joints: dict[str, JointEntry],
-    held: dict[str, float],
-    couplings: dict[str, tuple[str, float, float]],
-    base: str,
-    notes: list[str],
-) -> None:
-    """Hold joints that move no mass at all, such as grippers that the file draws only: they turn nothing."""
-    children: dict[str, list[str]] = {}
-    for joint in joints.values():
-        children.setdefault(joint.parent, []).append(joint.child)
-    idle = []
-    for name, joint in joints.items():
-        if name in held:
-            continue
-        below, front = {joint.child}, [joint.child]
-        while front:
-            for child in children.get(front.pop(), []):
-                below.add(child)
-                front.append(child)
-        links = [description.links[link] for link in below]
-        if base not in below and not any(link.mass or link.inertia.any() for link in links):
-            idle.append(name)
-    for name in idle:
-        if all(driver != name or follower in idle for follower, (driver, _, _) in couplings.items()):
-            held[name] = joints[name].rest
-            couplings.pop(name, None)
-            notes.append(f"held at {held[name]!r}: joint {shorten(name)}, which carries no mass")
-
-
 def _groups(
     description: Description, joints: dict[str, JointEntry], held: dict[str, float], root: str, notes: list[str]
 ) -> dict[str, str]:
@@ -232,23 +113,6 @@ def _groups(
             merged.setdefault(group[link], []).append(link)
     notes += [f"merged into link {shorten(into)}: {shorten(', '.join(links))[1:-1]}" for into, links in merged.items()]
     return group
-
-
-def _check_constraints(
-    description: Description, joints: dict[str, JointEntry], held: dict[str, float], group: dict[str, str], notes: list
-) -> None:
-    for name, kind, links, tied in description.constraints:
-        gone = [x for x in links if x not in group] + [x for x in tied if x not in joints]
-        if gone:
-            notes.append(f"dropped: equality constraint {shorten(name)} ({kind}), whose {shorten(gone[0])} is dropped")
-        elif len({group[link] for link in links}) <= 1 and all(joint in held for joint in tied):
-            notes.append(f"met by locking: equality constraint {shorten(name)} ({kind})")
-        else:
-            between = shorten(", ".join((*links, *tied)))
-            raise ValueError(
-                f"equality constraint {shorten(name)} ({kind}) ties {between}; a robot here is a tree: lock the joints "
-                "that it ties"
-            )
 
 
 def _poses(joints: dict[str, JointEntry], held: dict[str, float], root: str) -> dict[str, _Pose]:
@@ -348,7 +212,7 @@ def _numbers(
             where = place.then(shape.rotation, shape.position)
             moved = shape._replace(rotation=where.rotation, position=where.position - origin[i])
             shapes.append((i, link, moved))
-    ratios, rotors = _motors(moving, joints, gear_ratio, rotor_inertia, notes)
+    ratios, rotors = motors(moving, joints, gear_ratio, rotor_inertia, notes)
     label = [base if i == 0 else name for i, name in enumerate(names)]
     fields = {
         "mass": mass,
@@ -370,42 +234,3 @@ def _numbers(
     if outside:
         notes.append(f"theta = 0 is outside of the limits of {shorten(', '.join(outside))[1:-1]}")
     return Reduced(fields, shapes, notes)
-
-
-def _motors(
-    moving: list[str],
-    joints: dict[str, JointEntry],
-    gear_ratio: Mapping[str, float],
-    rotor_inertia: Mapping[str, float],
-    notes: list[str],
-) -> tuple[list[float], list[float]]:
-    """Gear ratios and rotor inertias: what is given, else the file's; an armature is `N^2 J`."""
-    for entry, given in (("gear_ratio", gear_ratio), ("rotor_inertia", rotor_inertia)):
-        for name, value in given.items():
-            if name not in moving:
-                raise ValueError(f"`{entry}` names {shorten(name)}, which does not move")
-            if isinstance(value, bool | str) or not np.isreal(value) or not np.isfinite(value):
-                raise ValueError(f"`{entry}[{shorten(name)}]` is {shorten(value)}; it must be a finite number")
-            if entry == "gear_ratio" and not value:
-                raise ValueError(f"`gear_ratio[{shorten(name)}]` is 0; a rotor turns as its joint does")
-    ratios = [float(gear_ratio.get(name, joints[name].gear_ratio)) for name in moving]
-    rotors, split, left_out = [], [], []
-    for name, ratio in zip(moving, ratios, strict=True):
-        armature = joints[name].armature
-        if name in rotor_inertia:
-            rotors.append(float(rotor_inertia[name]))
-        elif armature and (abs(ratio) > 1 or name in gear_ratio):
-            rotors.append(armature / ratio**2)
-            split.append(name)
-        else:
-            rotors.append(0.0)
-            if armature:
-                left_out.append(name)
-    if split:
-        notes.append(f"armature N^2 J split by the gear ratio N: {shorten(', '.join(split))[1:-1]}")
-    if left_out:
-        notes.append(
-            f"armature left out, since the file has no gear ratio to split N^2 J by (give gear_ratio=): "
-            f"{shorten(', '.join(left_out))[1:-1]}"
-        )
-    return ratios, rotors
