@@ -12,7 +12,6 @@ AXES = ("#009e73", "#cc79a7", "#d55e00")
 """Colours of x, y and z, and so of tilt about x, tilt about y and roll about z."""
 ANGLES = tuple(zip(("tilt about x", "tilt about y", "roll about z"), AXES, strict=True))
 """The base's angles, as `tilt_and_roll` gives them, and their colours."""
-MEASURED = "#333f48"
 
 
 def link_colour(link: int) -> str:
