@@ -6,7 +6,8 @@ Prints a table and writes design.json. Closed polygons of least joint travel wit
 several robots, from the same random starts. The others run start by start with the same functions, values and
 reverse-mode derivatives compiled, each point evaluated once. Times are without compilation, by turns, the least of
 three; ratios are of one run. Converged: feasible to 1e-8, and of reojax also stationary to 1e-6. SLSQP is SciPy's;
-IPOPT (`pip install cyipopt`) uses its limited-memory Hessian, and is left out where it is not installed.
+IPOPT (`pip install cyipopt`) uses its limited-memory Hessian, and is left out where it is not installed. Set
+OPENBLAS_NUM_THREADS=1: the small BLAS calls of SLSQP otherwise get in each other's way on a busy machine.
 
 Expected: several times as many starts a second as either, as many converged, and no worse a best cost.
 """
