@@ -70,7 +70,7 @@ def _of_path(robot: Robot, path: Path, samples: int) -> Nodes:
 
 
 def _of_trajectory(robot: Robot, trajectory: Trajectory, momentum: Array, samples: int) -> Nodes:
-    rotation, time, state = orientation_along(robot, trajectory, momentum, 2 * samples)
+    rotation, time, state, _ = orientation_along(robot, trajectory, momentum, 2 * samples)
     index = _triples(2 * samples * trajectory.pieces)
     one = jnp.ones(index.shape, time.dtype)
     return Nodes(time[index], state.theta[index], state.theta_dot[index], rotation[index], one, momentum)
