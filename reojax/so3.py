@@ -24,6 +24,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array
+from reojax._internal.quaternions import outer_rows
 
 
 def hat(vector: ArrayLike) -> Float[Array, "3 3"]:
@@ -265,12 +266,8 @@ def _quaternion_matrix(w: jax.Array, u: jax.Array, square: jax.Array | float = 1
 
 def _unit_quaternion(r: jax.Array) -> jax.Array:
     """Of the rows of `4 q q^T`, linear in the matrix, normalise that of the largest component (Shepperd)."""
-    x, y, z = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
-    xy, yz, zx = r[0, 1] + r[1, 0], r[1, 2] + r[2, 1], r[2, 0] + r[0, 2]
-    a, b, c = r[0, 0], r[1, 1], r[2, 2]
-    ww, xx, yy, zz = 1 + a + b + c, 1 + a - b - c, 1 - a + b - c, 1 - a - b + c
-    rows = [[ww, x, y, z], [x, xx, xy, zx], [y, xy, yy, yz], [z, zx, yz, zz]]
-    largest = lax.argmax(jnp.stack([ww, xx, yy, zz]), 0, np.int32)
+    rows = outer_rows(r)
+    largest = lax.argmax(jnp.stack([rows[i][i] for i in range(4)]), 0, np.int32)
     row = lax.select_n(largest, *(jnp.stack(row) for row in rows))
     q = row / jnp.sqrt(jnp.sum(row * row))
     return jnp.where(q[0] < 0, -q, q)

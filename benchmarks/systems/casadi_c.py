@@ -97,7 +97,7 @@ def _step(ca: Any, edge: int, steps: int) -> Any:
 
 
 def _omega(ca: Any, theta: Any, rate: Any, end_inertia: Any, ratio: Any) -> Any:
-    """Angular velocity of the base, by the recursion that reojax.mechanics._fast/omega.py explains."""
+    """Angular velocity of the base, by the recursion that reojax.mechanics._fast/recursion.py explains."""
     robot, eye = prototype(), ca.SX.eye(3)
     longer = ca.sqrt(end_inertia / END_INERTIA)
     stretch = ca.diag(ca.vertcat(longer, longer, 1))

@@ -7,34 +7,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-
-def product(p: Any, q: Any) -> tuple[Any, Any, Any, Any]:
-    """Quaternion of `P @ Q`; any four components that can be multiplied."""
-    a, b, c, d = p
-    w, x, y, z = q
-    return (
-        a * w - b * x - c * y - d * z,
-        a * x + b * w + c * z - d * y,
-        a * y - b * z + c * w + d * x,
-        a * z + b * y - c * x + d * w,
-    )
-
-
-def inverse(q: Any) -> tuple[Any, Any, Any, Any]:
-    """Quaternion of the inverse rotation."""
-    w, x, y, z = q
-    return w, -x, -y, -z
+from reojax._internal.quaternions import inverse as inverse, matrix_rows, outer_rows, product as product
 
 
 def from_matrices(rotations: np.ndarray) -> Float[np.ndarray, "4 m"]:
     """Quaternions of rotations (m, 3, 3), w >= 0, from the largest component of each (Shepperd)."""
     r = np.moveaxis(np.asarray(rotations, float), 0, -1)
-    x, y, z = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
-    xy, yz, zx = r[0, 1] + r[1, 0], r[1, 2] + r[2, 1], r[2, 0] + r[0, 2]
-    a, b, c = r[0, 0], r[1, 1], r[2, 2]
-    diagonal = np.stack([1 + a + b + c, 1 + a - b - c, 1 - a + b - c, 1 - a - b + c])
-    ww, xx, yy, zz = diagonal
-    rows = np.stack([[ww, x, y, z], [x, xx, xy, zx], [y, xy, yy, yz], [z, zx, yz, zz]])
+    rows = np.array(outer_rows(r))
+    diagonal = rows[range(4), range(4)]
     q = np.take_along_axis(rows, diagonal.argmax(0)[None, None], 0)[0]
     q = q / np.sqrt((q * q).sum(0))
     return np.where(q[0] < 0, -q, q)
@@ -42,13 +22,7 @@ def from_matrices(rotations: np.ndarray) -> Float[np.ndarray, "4 m"]:
 
 def to_matrices(q: Any) -> Float[np.ndarray, "m 3 3"]:
     """Rotations (m, 3, 3) of unit quaternions (4, m)."""
-    w, x, y, z = q
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    return np.moveaxis(np.array(matrix_rows(q)), (0, 1), (-2, -1))
 
 
 def angles(q: Any) -> Float[np.ndarray, " m"]:

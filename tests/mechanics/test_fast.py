@@ -21,7 +21,7 @@ from reojax.mechanics._fast.magnus import step_rotations
 from reojax.mechanics._fast.materialize import materialize
 from reojax.mechanics._fast.nodes import NODES, path_nodes
 from reojax.mechanics._fast.parameters import components, flatten, known_parameters, parameters, pattern_of, split
-from reojax.mechanics._fast.quaternions import product, products_up_to, to_matrix
+from reojax.mechanics._fast.quaternions import ordered_product, products_up_to, to_matrix
 from reojax.mechanics._fast.recursion import inward, solve
 from reojax.mechanics._fast.scalar import scaled
 from reojax.mechanics._fast.sincos import sincos
@@ -74,7 +74,7 @@ def test_a_step_is_the_exponential():
     along = np.pi / 4 * k * np.stack([-np.sin(t), np.cos(t), 0 * t])
     steps = step_rotations(tuple(jnp.asarray(x) for x in along)).rotation
     exact = Rotation.from_rotvec([0, 2 * np.pi * k, 2 * np.pi]).as_matrix()
-    np.testing.assert_allclose(to_matrix(product(steps)), exact, atol=1e-13)
+    np.testing.assert_allclose(to_matrix(ordered_product(steps)), exact, atol=1e-13)
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 16])
@@ -85,7 +85,7 @@ def test_products_are_in_order(count):
     for matrix in turns.as_matrix():
         so_far = so_far @ matrix
         expected.append(so_far)
-    np.testing.assert_allclose(to_matrix(product(factors)), expected[-1], atol=1e-14)
+    np.testing.assert_allclose(to_matrix(ordered_product(factors)), expected[-1], atol=1e-14)
     np.testing.assert_allclose(jax.vmap(to_matrix)(products_up_to(factors)), np.array(expected), atol=1e-14)
 
 

@@ -25,9 +25,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from reojax._internal.quaternions import product
 from reojax.mechanics._fast.materialize import materialize
 from reojax.mechanics._fast.nodes import LEGENDRE, NODES, WEIGHTS, per_step
-from reojax.mechanics._fast.quaternions import Quaternion, Triple, multiply
+from reojax.mechanics._fast.quaternions import Quaternion, Triple
 from reojax.mechanics._fast.scalar import cross, dot, mul, plus, scaled
 from reojax.mechanics._fast.sincos import horner, sincos
 
@@ -99,8 +100,8 @@ def step_rotations(omega: Triple) -> Step:
     for a, b in pairwise(m):
         first = plus(first, scaled(0.5, cross(a, b)))
     half = materialize(_exp(scaled(0.5, _moments(omega, 1)[0])))
-    inner = materialize(multiply(_exp_small(first), _exp_small(_moments(u, 1)[0])))
-    rotation = materialize(multiply(multiply(half, inner), half))
+    inner = materialize(product(_exp_small(first), _exp_small(_moments(u, 1)[0])))
+    rotation = materialize(product(product(half, inner), half))
 
     def turns() -> tuple[Triple, ...]:
         return scaled(s, mean), turned, _spread(v, _INTEGRAL)

@@ -21,6 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
+from reojax._internal.quaternions import inverse, product
 from reojax.mechanics._fast import rolled
 from reojax.mechanics._fast.blocking import Call, in_blocks
 from reojax.mechanics._fast.magnus import Step, mean_over_step, step_rotations
@@ -42,9 +43,7 @@ from reojax.mechanics._fast.parameters import (
 from reojax.mechanics._fast.quaternions import (
     Quaternion,
     Triple,
-    inverse,
-    multiply,
-    product,
+    ordered_product,
     products_up_to,
     rotate,
     shift,
@@ -55,7 +54,7 @@ from reojax.mechanics._fast.scalar import Symmetric, Vector, cross, plus, scaled
 from reojax.mechanics._fast.sincos import sincos
 from reojax.robot import Robot
 
-ROLLED_ALONE, ROLLED_IN_BATCHES = 6, 12
+ROLLED_ALONE, ROLLED_IN_BATCHES = 9, 12
 """Joints beyond which the passes over the tree are loops over joints (`rolled`), for one design and for few designs.
 
 Such a program is compiled in a few seconds whatever the number of joints, and runs as fast for one design; for many it
@@ -135,7 +134,7 @@ def _nodes(problem: RotationProblem, points: jax.Array) -> int:
 
 
 def _rotation(problem: RotationProblem, numbers: jax.Array, points: jax.Array) -> list[jax.Array]:
-    return [to_matrix(product(_steps_of_path(problem, numbers, points).rotation))]
+    return [to_matrix(ordered_product(_steps_of_path(problem, numbers, points).rotation))]
 
 
 def _steps_of_path(problem: RotationProblem, numbers: jax.Array, points: jax.Array) -> Step:
@@ -175,7 +174,7 @@ def _solution(base: Base, like: jax.Array) -> NodeSolution:
     omega = materialize(_at_nodes(solve(inertia, scaled(-1, moving[:3])), like))
     velocity = materialize(scaled(-1, plus(drift, cross(omega, centre))))
     step = step_rotations(omega)
-    to_step = materialize(multiply(shift(products_up_to(step.rotation), 1), step.half))
+    to_step = materialize(product(shift(products_up_to(step.rotation), 1), step.half))
     return NodeSolution(inertia, centre, omega, velocity, step, to_step)
 
 

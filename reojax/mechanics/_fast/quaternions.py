@@ -3,19 +3,14 @@
 import jax
 import jax.numpy as jnp
 
+from reojax._internal.quaternions import matrix_rows, product
 from reojax.mechanics._fast.materialize import materialize
-from reojax.mechanics._fast.scalar import cross, dot, mul, plus, scaled, sub
+from reojax.mechanics._fast.scalar import cross, plus, scaled
 
 Quaternion = tuple[jax.Array, ...]
 """w, x, y, z."""
 Triple = tuple[jax.Array, ...]
 """x, y, z."""
-
-
-def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Return the quaternion of the rotation `a b`: in the frame that `a` made, do `b`."""
-    s, u, t, v = a[0], a[1:], b[0], b[1:]
-    return sub(mul(s, t), dot(u, v)), *plus(plus(scaled(s, v), scaled(t, u)), cross(u, v))
 
 
 def rotate(q: Quaternion, v: Triple) -> Triple:
@@ -25,24 +20,12 @@ def rotate(q: Quaternion, v: Triple) -> Triple:
     return plus(plus(v, scaled(q[0], twice)), cross(u, twice))
 
 
-def inverse(q: Quaternion) -> Quaternion:
-    """Return the quaternion of the inverse rotation."""
-    w, x, y, z = q
-    return w, -x, -y, -z
-
-
 def to_matrix(q: Quaternion) -> jax.Array:
     """Return the 3x3 matrix of one unit quaternion, four scalars."""
-    w, x, y, z = q
-    columns = (
-        [1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)],
-        [2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)],
-        [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)],
-    )
-    return jnp.stack([jnp.stack(column) for column in columns], axis=1)
+    return jnp.stack([jnp.stack(row) for row in matrix_rows(q)])
 
 
-def product(factors: Quaternion) -> Quaternion:
+def ordered_product(factors: Quaternion) -> Quaternion:
     """Return `factors[0] factors[1] ... factors[m - 1]` of arrays (m,), m >= 1, as four scalars.
 
     Products of pairs, of pairs of pairs, and so on.
@@ -51,7 +34,7 @@ def product(factors: Quaternion) -> Quaternion:
         w, *xyz = factors
         odd = (0, w.shape[0] % 2)
         pairs = [c.reshape(-1, 2) for c in (jnp.pad(w, odd, constant_values=1), *(jnp.pad(c, odd) for c in xyz))]
-        factors = materialize(multiply(*(tuple(c[:, side] for c in pairs) for side in (0, 1))))
+        factors = materialize(product(*(tuple(c[:, side] for c in pairs) for side in (0, 1))))
     return tuple(c[0] for c in factors)
 
 
@@ -62,7 +45,7 @@ def products_up_to(factors: Quaternion) -> Quaternion:
     """
     length = 1
     while length < factors[0].shape[0]:
-        factors = materialize(multiply(shift(factors, length), factors))
+        factors = materialize(product(shift(factors, length), factors))
         length *= 2
     return factors
 
