@@ -49,7 +49,7 @@ def on_host(entry: str, value: Any, what: str) -> None:
 
 def whole(entry: str, value: Any, least: int = 1, most: int = _MOST) -> int:
     """Return one integer, from `least` to `most`."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+    if isinstance(value, bool | np.timedelta64) or not isinstance(value, int | np.integer) or value < least:
         rule = "a positive integer" if least == 1 else f"an integer of at least {least}"
         raise ValueError(f"`{entry}` is {shorten(value)}; it must be {rule}.")
     if value > most:
@@ -87,7 +87,11 @@ def index_of(entry: str, value: Any, names: Sequence[str], kind: str) -> int:
     """Number of a link or joint (`kind`) that is given by number or by name."""
     if isinstance(value, str) and value in names:
         return list(names).index(value)
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 0 <= value < len(names):
+    if (
+        isinstance(value, bool | np.timedelta64)
+        or not isinstance(value, int | np.integer)
+        or not 0 <= value < len(names)
+    ):
         known = f"a number from 0 to {len(names) - 1} or one of {shorten(', '.join(names))[1:-1]}" if names else "none"
         raise ValueError(f"`{entry}` is {shorten(value)}; it must be a {kind} of the robot: {known}.")
     return int(value)

@@ -101,11 +101,16 @@ def calibrate(
         ValueError: if the capture lacks joints or orientation, or does not fit the robot, or for an unknown parameter.
     """
     checks.instance("robot", robot, Robot, "`make_robot` makes")
+    checks.whole("max_steps", max_steps)
+    if not isinstance(clock, bool | np.bool_):
+        raise ValueError(f"`clock` is {checks.shorten(clock)}; it must be True or False.")
     fitted = resolve(robot, parameters)
     problem = _Problem(robot, capture, fitted, clock)
-    noise = _joint_noise(capture) if joint_noise is None else float(joint_noise)
-    if not (np.isfinite(noise) and noise >= 0):
-        raise ValueError(f"`joint_noise` is {joint_noise}; it must be a finite angle in radians, not negative.")
+    noise = _joint_noise(capture) if joint_noise is None else checks.number("joint_noise", joint_noise, unit="rad")
+    if not noise >= 0:
+        raise ValueError(
+            f"`joint_noise` is {checks.shorten(joint_noise)}; it must be a finite angle in radians, not negative."
+        )
 
     start = np.array([p.start for p in fitted])
     state = problem.fit_window(start)
@@ -155,7 +160,7 @@ class _Problem:
         if capture.theta.shape[1] != robot.joints:
             raise ValueError(f"the capture has {capture.theta.shape[1]} joints; {robot.name!r} has {robot.joints}.")
         theta = fill_gaps(capture)
-        self.robot, self.fitted, self.clock, self.time = robot, fitted, clock, capture.time
+        self.robot, self.fitted, self.clock, self.time = robot, fitted, bool(clock), capture.time
         self.seen = np.flatnonzero(capture.seen_rotation)
         self.measured = np.asarray(capture.rotation)[self.seen]
         self.edges = len(theta) - 1

@@ -172,7 +172,7 @@ def _lines(path: str | os.PathLike[str]) -> Iterator[tuple[int, str]]:
             try:
                 text = line.decode("utf-8" if number else "utf-8-sig")
             except UnicodeDecodeError:
-                raise ValueError(f"cannot read {str(path)!r}: it is not text in UTF-8.") from None
+                raise ValueError(f"cannot read {shorten(str(path))}: it is not text in UTF-8.") from None
             for part in text.rstrip("\r\n").split("\r"):  # old files end their lines with a carriage return alone
                 number += 1
                 if part.strip() and not part.lstrip().startswith("#"):

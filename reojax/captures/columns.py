@@ -83,14 +83,14 @@ def read_header(cells: Sequence[str], joint_names: Sequence[str], angle_unit: st
         if unit is None:
             raise ValueError(f"column {header!r} has no unit; call it {header + '_deg'!r} or {header + '_rad'!r}.")
         if unit not in RADIANS:
-            raise ValueError(f"column {header!r} has the unit {unit!r}; angles are in deg or rad.")
+            raise ValueError(f"column {header!r} has the unit {shorten(unit)}; angles are in deg or rad.")
         return RADIANS[unit]
 
     if "time" not in found:
         raise ValueError(f"there is no column 'time'; the columns are {_as_list(cells)}.")
     unit = units["time"] or "s"
     if unit not in SECONDS:
-        raise ValueError(f"column {cells[found['time']]!r} has the unit {unit!r}; time is in s, ms, us or ns.")
+        raise ValueError(f"column {cells[found['time']]!r} has the unit {shorten(unit)}; time is in s, ms, us or ns.")
     joints = _all_or_none(found, [_joint(k) for k in range(len(joint_names))], cells, joint_names)
     quaternion, zxz = _all_or_none(found, QUATERNION, cells), _all_or_none(found, ZXZ, cells)
     if quaternion and zxz:

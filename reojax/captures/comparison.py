@@ -13,7 +13,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from jaxtyping import Float
 
-from reojax._internal.arrays import Array
+from reojax._internal.arrays import Array, as_numbers
+from reojax._internal.checks import instance, number
 from reojax.captures.capture import Capture
 from reojax.mechanics.attitude import tilt_and_roll, zxz_beside, zxz_without_jumps
 from reojax.mechanics.holonomy import rotation_history
@@ -148,15 +149,35 @@ def compare(
         simulated = joints_simulated(robot, capture)
         capture = capture._replace(theta=None)
     else:
-        simulated = Sampled(*(np.asarray(x, float) for x in (motion.time, motion.theta, motion.rotation)))
+        simulated = _sampled(motion)
         if simulated.theta.shape[1] != robot.joints:
             raise ValueError(f"`motion` has {simulated.theta.shape[1]} joints; {robot.name!r} has {robot.joints}.")
     found = False
     if offset is None:
         offset, found = align(capture, simulated)
-    elif not np.isfinite(offset):
-        raise ValueError(f"`offset` is {offset}; it must be a finite time in seconds.")
+    else:
+        offset = number("offset", offset, unit="s")
     return _comparison(capture, simulated, float(offset), found)
+
+
+def _sampled(motion: Simulated) -> Sampled:
+    """The motion as arrays.
+
+    Raises:
+        ValueError: if it is none: no time, angles and orientations that go together.
+    """
+    if not all(hasattr(motion, field) for field in Sampled._fields):
+        kind = type(motion).__name__
+        raise ValueError(f"`motion` is a {kind}; it must have time, theta and rotation, as a Motion has.")
+    arrays = [np.asarray(as_numbers(f"motion.{field}", getattr(motion, field)), float) for field in Sampled._fields]
+    time, theta, rotation = arrays
+    frames = len(time) if time.ndim == 1 else 0
+    if frames < 2 or theta.shape[:1] != (frames,) or theta.ndim != 2 or rotation.shape != (frames, 3, 3):
+        shapes = ", ".join(str(array.shape) for array in arrays)
+        raise ValueError(f"`motion` has time, theta and rotation of shapes {shapes}; they do not go together.")
+    if not all(np.isfinite(array).all() for array in arrays) or (np.diff(time) < 0).any():
+        raise ValueError("`motion` has numbers that are not finite, or times that go back.")
+    return Sampled(*arrays)
 
 
 def align(capture: Capture, motion: Simulated) -> tuple[float, bool]:
@@ -192,6 +213,7 @@ def align(capture: Capture, motion: Simulated) -> tuple[float, bool]:
 
 
 def _check_joints(robot: Robot, capture: Capture) -> None:
+    instance("robot", robot, Robot, "`make_robot` makes")
     if not isinstance(capture, Capture):
         kind = type(capture).__name__
         raise ValueError(f"`capture` is a {kind}; it must be a Capture, such as `read_capture` returns.")

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from reojax._internal.arrays import Array
+from reojax._internal.checks import shorten
 from reojax.robot import Robot
 from reojax.robots.edits import with_end_inertia
 
@@ -120,7 +121,7 @@ def resolve(robot: Robot, parameters: object) -> tuple[Parameter, ...]:
     try:
         listed = list(parameters)  # pyright: ignore[reportArgumentType]
     except TypeError as error:
-        raise ValueError(f"`parameters` is {parameters!r}; it must be a list of names.") from error
+        raise ValueError(f"`parameters` is {shorten(parameters)}; it must be a list of names.") from error
     found = tuple(p if isinstance(p, Parameter) else parameter(robot, str(p)) for p in listed)
     names = [p.name for p in found]
     if not names or len(set(names)) != len(names):

@@ -75,7 +75,7 @@ def write_trajectory(
             expected = (len(when), robot.joints)
             raise ValueError(f"`{names[key]}` has shape {array.shape}; for {robot.name!r} it must be {expected}.")
     if not (np.isfinite(delay) and delay >= 0):
-        raise ValueError(f"`delay` is {delay}; it must be a time in seconds, not negative.")
+        raise ValueError(f"`delay` is {shorten(delay)}; it must be a time in seconds, not negative.")
     nanoseconds = np.round((when - when[0] + delay) * 1e9).astype(np.int64)
     if (np.diff(nanoseconds) < 1).any():
         point = int(np.argmax(np.diff(nanoseconds) < 1)) + 1

@@ -22,6 +22,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, is_concrete
 from reojax.mechanics.dynamics import Load
 from reojax.robot import Robot
@@ -167,9 +168,10 @@ def check_motors(motors: Motor | Sequence[Motor], robot: Robot, *, compare: bool
         ValueError: naming the entry, its value and the rule: numbers of a wrong shape, not positive, or with
             `compare` a rotor inertia or gear ratio more than a fifth away from the robot's.
     """
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
     if not isinstance(motors, Motor):
         if not isinstance(motors, Sequence) or not all(isinstance(m, Motor) for m in motors):
-            raise ValueError(f"`motors` is {motors!r}; it must be a Motor, or one Motor for each joint.")
+            raise ValueError(f"`motors` is {checks.shorten(motors)}; it must be a Motor, or one Motor for each joint.")
         if len(motors) != robot.joints:
             raise ValueError(f"`motors` has {len(motors)} motors; {robot.name!r} has {robot.joints} joints.")
         columns: dict[str, Any] = {field: [getattr(m, field) for m in motors] for field in Motor._fields}

@@ -35,6 +35,7 @@ from reojax.robot import Robot
 
 COUNTS = 512.0
 """Counts of an encoder to a turn of its motor, before the gear (thesis 2.6)."""
+_MOST_SAMPLES = 10**7
 _CREEP = 1.0
 """Speed of a rotor over which friction changes its sign smoothly [rad/s]."""
 
@@ -93,12 +94,15 @@ def gains(robot: Robot, bandwidth: ArrayLike, theta: ArrayLike | None = None) ->
     Raises:
         ValueError: if `bandwidth` is not positive and finite, or has another shape.
     """
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
     p = as_numbers("bandwidth", bandwidth)
     if p.shape not in ((), (robot.joints,)):
         raise ValueError(f"`bandwidth` has shape {p.shape}; it must be one number or ({robot.joints},).")
     if is_concrete(p) and not (np.isfinite(p) & (np.asarray(p) > 0)).all():
         raise ValueError(f"`bandwidth` is {np.asarray(p).tolist()}; it must be positive and finite.")
     shape = np.zeros(robot.joints) if theta is None else as_numbers("theta", theta)
+    if shape.shape != (robot.joints,) or (is_concrete(shape) and not np.isfinite(shape).all()):
+        raise ValueError(f"`theta` is {checks.shorten(theta)}; it must be {robot.joints} finite angles.")
     inertia = jnp.diagonal(joint_inertia(robot, shape))
     return Gains(3 * inertia * p**2, inertia * p**3, 3 * inertia * p)
 
@@ -136,20 +140,36 @@ def track(
         substeps: Runge-Kutta steps to a sample, static.
 
     Raises:
-        ValueError: if anything does not fit the robot, a time is not positive, or a gain is negative or not finite.
+        ValueError: if anything does not fit the robot, a time is not positive, or a gain is negative or not finite, or
+            if the joints run away until no number comes out.
     """
     _check(robot, trajectory, sample_time=sample_time, counts=counts, settle=settle, substeps=substeps)
     believed = robot if model is None else model
     if not isinstance(believed, Robot) or believed.joints != robot.joints:
-        raise ValueError(f"`model` is {believed!r}; it must be a Robot of {robot.joints} joints.")
+        raise ValueError(f"`model` is {checks.shorten(believed)}; it must be a Robot of {robot.joints} joints.")
     motors = check_motors(motors, robot)
     gains = _gains(gains, robot)
     start = as_numbers("momentum", np.zeros(3) if momentum is None else momentum)
     if start.shape != (3,) or (is_concrete(start) and not np.isfinite(start).all()):
-        raise ValueError(f"`momentum` is {momentum}; it must be 3 finite numbers.")
+        raise ValueError(f"`momentum` is {checks.shorten(momentum)}; it must be 3 finite numbers.")
     turn = 0.0 if counts is None else 2 * np.pi / counts
-    samples = int(np.ceil((float(np.asarray(trajectory.breaks)[-1]) + settle) / sample_time - 1e-9))
-    return _track(robot, believed, trajectory, motors, gains, start, sample_time, turn, feedforward, samples, substeps)
+    count = np.ceil((float(np.asarray(trajectory.breaks)[-1]) + settle) / sample_time - 1e-9)
+    if not count <= _MOST_SAMPLES:
+        raise ValueError(
+            f"`sample_time` of {sample_time:g} s makes {count:.3g} samples; at most {_MOST_SAMPLES} are run."
+        )
+    given = (robot, believed, trajectory, motors, gains, start, sample_time, turn, feedforward)
+    if not is_concrete(given):
+        return _track(*given, int(count), int(substeps))
+    with jax.debug_nans(False):  # told below
+        found = _track(*given, int(count), int(substeps))
+    lost = ~np.isfinite(found.theta).all(axis=1) | ~np.isfinite(found.rotation).all(axis=(1, 2))
+    if lost.any():
+        raise ValueError(
+            f"the joints run away under this control, and after {float(found.time[int(np.argmax(lost))]):.4g} s no "
+            "number comes out: choose smaller gains, a shorter `sample_time`, or more `substeps`."
+        )
+    return found
 
 
 def _check(robot: Robot, trajectory: Trajectory, **numbers: float | None) -> None:
@@ -161,9 +181,14 @@ def _check(robot: Robot, trajectory: Trajectory, **numbers: float | None) -> Non
     if not is_concrete(trajectory.breaks):
         raise ValueError("`trajectory` has traced durations; the number of samples must be known.")
     for entry, value in numbers.items():
-        least = 0.0 if entry == "settle" else np.finfo(float).tiny
-        if value is not None and not (np.isfinite(value) and value >= least):
-            raise ValueError(f"`{entry}` is {value!r}; it must be positive and finite.")
+        if value is None and entry == "counts":  # perfect encoders
+            continue
+        if entry == "substeps":
+            checks.whole(entry, value)
+        elif entry == "settle":
+            checks.number(entry, value, unit="s", least=0.0)
+        else:
+            checks.positive(entry, value, unit="s" if entry == "sample_time" else "")
 
 
 def _gains(gains: Gains, robot: Robot) -> Gains:

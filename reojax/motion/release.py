@@ -181,7 +181,7 @@ def release_spread(
     robot, trajectory, mean = _check_release(robot, trajectory, aim, DEFAULT_STEPS if steps is None else steps)
     *_, spread = _check_release(robot, trajectory, deviation, 1)
     if is_concrete(spread) and (np.asarray(spread) < 0).any():
-        raise ValueError(f"`deviation` is {deviation}; standard deviations must not be negative.")
+        raise ValueError(f"`deviation` is {checks.shorten(deviation)}; standard deviations must not be negative.")
     if steps is None:
         steps = DEFAULT_STEPS
         if is_concrete((robot, trajectory, mean, spread)):

@@ -117,7 +117,7 @@ def simulate(
     trajectory = _trajectory(robot, path, law, durations)
     start = as_numbers("momentum", np.zeros(3) if momentum is None else momentum)
     if start.shape != (3,) or (is_concrete(start) and not np.isfinite(start).all()):
-        raise ValueError(f"`momentum` is {momentum}; it must be 3 finite numbers.")
+        raise ValueError(f"`momentum` is {checks.shorten(momentum)}; it must be 3 finite numbers.")
     samples = checks.whole("samples", samples)
     motors = None if motors is None else check_motors(motors, robot)
 

@@ -15,6 +15,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array, as_numbers, is_concrete
+from reojax._internal.checks import shorten
 from reojax.motion.splines import least_jerk
 
 
@@ -43,7 +44,7 @@ def trapezoid(ramp: ArrayLike = 1 / 3) -> Law:
     """
     r = as_numbers("ramp", ramp)
     if r.shape or (is_concrete(r) and not 0 < r <= 0.5):
-        raise ValueError(f"`ramp` is {ramp}; it must be one number above 0 and at most 0.5.")
+        raise ValueError(f"`ramp` is {shorten(ramp)}; it must be one number above 0 and at most 0.5.")
     if is_concrete(r) and r == 0.5:  # two pieces, as the one between would take no time
         return Law(np.array([0.0, 0.5, 1.0]), np.array([[0.0, 0, 2, 0, 0, 0], [0.5, 2, -2, 0, 0, 0]]))
     rate = 1 / (1 - r)
@@ -89,7 +90,7 @@ def by_name(name: str) -> Law:
         ValueError: if `name` is not in `LAWS`.
     """
     if name not in LAWS:
-        raise ValueError(f"there is no time law named {name!r}; the names are {', '.join(LAWS)}.")
+        raise ValueError(f"there is no time law named {shorten(name)}; the names are {', '.join(LAWS)}.")
     return LAWS[name]()
 
 
@@ -102,5 +103,7 @@ def check_law(law: Law | str) -> Law:
     if isinstance(law, str):
         return by_name(law)
     if not isinstance(law, Law):
-        raise ValueError(f"`law` is {law!r}; it must be a Law, such as `quintic()`, or one of {', '.join(LAWS)}.")
+        raise ValueError(
+            f"`law` is {shorten(law)}; it must be a Law, such as `quintic()`, or one of {', '.join(LAWS)}."
+        )
     return law

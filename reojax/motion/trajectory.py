@@ -197,4 +197,11 @@ def _durations(durations: ArrayLike, path: Path, *, still: bool = True) -> Array
         if bad.any():
             edge = int(np.argmax(bad))
             raise ValueError(f"durations[{edge}] is {times[edge]} s; a duration must be positive and finite.")
+        most = 1e12 if times.dtype == np.float64 else 1e7
+        beyond = (times > most) | ((times > 0) & (times < 1 / most))
+        if beyond.any():
+            edge = int(np.argmax(beyond))
+            raise ValueError(
+                f"durations[{edge}] is {times[edge]} s; in {times.dtype} it must be from {1 / most:g} to {most:g} s."
+            )
     return times

@@ -7,6 +7,8 @@ import jax
 import numpy as np
 from jax.sharding import Mesh
 
+from reojax._internal.checks import shorten
+
 Devices = int | Sequence[jax.Device] | None
 
 
@@ -28,7 +30,9 @@ def mesh_of(devices: Devices) -> Mesh:
     else:
         chosen = list(devices) if isinstance(devices, Sequence) else [devices]
     if not chosen or not all(isinstance(device, jax.Device) for device in chosen):
-        raise ValueError(f"`devices` is {devices!r}; it must be None, a number of devices, or a list of JAX devices.")
+        raise ValueError(
+            f"`devices` is {shorten(devices)}; it must be None, a number of devices, or a list of JAX devices."
+        )
     if len(set(chosen)) < len(chosen):
         raise ValueError("`devices` names a device twice.")
     return Mesh(np.array(chosen), ("device",))

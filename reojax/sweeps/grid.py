@@ -13,6 +13,7 @@ from jaxtyping import Shaped
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import is_concrete
+from reojax._internal.checks import shorten
 
 
 class Designs(NamedTuple):
@@ -76,7 +77,7 @@ def check_axes(axes: Mapping[str, ArrayLike]) -> Designs:
         ValueError: naming the axis and what is wrong with it.
     """
     if not isinstance(axes, Mapping) or not axes:
-        raise ValueError(f"`axes` is {axes!r}; it must map at least one name to the values of that axis.")
+        raise ValueError(f"`axes` is {shorten(axes)}; it must map at least one name to the values of that axis.")
     checked = {name: _check_axis(name, values) for name, values in axes.items()}
     lengths = {name: len(values) for name, values in checked.items()}
     if isinstance(axes, Zipped) and len(set(lengths.values())) > 1:
@@ -91,7 +92,7 @@ def check_function(function: Callable[..., Any], designs: Designs) -> None:
         ValueError: if it does not.
     """
     if not callable(function):
-        raise ValueError(f"`function` is {function!r}; it must be a function of the axes' names.")
+        raise ValueError(f"`function` is {shorten(function)}; it must be a function of the axes' names.")
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):  # built in, without a signature: the call will tell
@@ -111,7 +112,7 @@ def _check_axis(name: str, values: ArrayLike) -> np.ndarray:
     try:
         array = np.asarray(values)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"axis {name!r} is {values!r}; it must be a list of real numbers.") from error
+        raise ValueError(f"axis {name!r} is {shorten(values)}; it must be a list of real numbers.") from error
     if array.ndim != 1 or not array.size:
         raise ValueError(f"axis {name!r} has shape {array.shape}; it must be a list of one value or more.")
     if not (np.issubdtype(array.dtype, np.integer) or jax.numpy.issubdtype(array.dtype, np.floating)):

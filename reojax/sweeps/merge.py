@@ -4,6 +4,7 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
+from reojax._internal.checks import shorten
 from reojax.sweeps.identity import differences
 from reojax.sweeps.memory import Memory
 from reojax.sweeps.result import Sweep
@@ -27,6 +28,9 @@ def merge(*folders: str | os.PathLike[str]) -> Sweep:
     """
     if not folders:
         raise ValueError("`merge` needs the folder of a store.")
+    for folder in folders:
+        if not isinstance(folder, str | os.PathLike):
+            raise ValueError(f"a folder is {shorten(folder)}; it must be the path of a store.")
     stores = [open_store(folder) for folder in folders]
     for store in stores[1:]:
         if store.hash != stores[0].hash:

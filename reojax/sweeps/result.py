@@ -175,7 +175,7 @@ class Sweep:
             units = {str(name): str(unit) for name, unit in about["units"].items()}
         except Exception as error:
             reason = f"there is no {error}" if isinstance(error, KeyError) else str(error).rstrip(".")
-            raise ValueError(f"cannot read {str(path)!r} as a sweep: {reason}.") from error
+            raise ValueError(f"cannot read {shorten(str(path))} as a sweep: {reason}.") from error
         return Sweep(designs, units, lambda: results, failures)
 
     def __repr__(self) -> str:

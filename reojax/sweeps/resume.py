@@ -9,6 +9,7 @@ import jax
 import numpy as np
 from jax.sharding import Mesh
 
+from reojax._internal.checks import shorten
 from reojax.sweeps.chunks import compile_chunk
 from reojax.sweeps.engine import run
 from reojax.sweeps.outputs import Outputs
@@ -52,7 +53,7 @@ def complete(
                     shown.add(chunk.number)
         except KeyboardInterrupt as interrupt:
             where = str(store.folder)
-            interrupt.add_note(f"finished chunks are in {where!r}, and the same sweep goes on from there")
+            interrupt.add_note(f"finished chunks are in {shorten(where)}, and the same sweep goes on from there")
             raise
     if several:
         from jax.experimental import multihost_utils

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from reojax._internal.archives import check_arrays, read_archive
+from reojax._internal.checks import shorten
 from reojax._internal.files import replacing
 from reojax.sweeps.chunks import Chunk
 from reojax.sweeps.grid import Designs
@@ -90,9 +91,11 @@ class Store:
         lost = [number for number in numbers if not self.has(number)]
         if lost:
             what = f"chunk {lost[0]}" if len(lost) == 1 else f"{len(lost)} chunks, the first one {lost[0]},"
-            raise ValueError(f"while the sweep ran, the store {str(self.folder)!r} has lost {what}; run it again.")
+            raise ValueError(
+                f"while the sweep ran, the store {shorten(str(self.folder))} has lost {what}; run it again."
+            )
         if open_store(self.folder).hash != self.hash:
-            raise ValueError(f"while the sweep ran, another one took the store {str(self.folder)!r}.")
+            raise ValueError(f"while the sweep ran, another one took the store {shorten(str(self.folder))}.")
 
 
 def _bad(designs: np.ndarray, reasons: np.ndarray, start: int, stop: int) -> dict[int, str]:
@@ -125,11 +128,11 @@ def create(
             _write_once(place / MANIFEST, json.dumps({"identity": same, "units": dict(units)}, indent=2) + "\n")
         _sweep_out(place)
     except OSError as error:
-        raise ValueError(f"cannot use {str(folder)!r} as a store: {error.strerror or error}.") from error
+        raise ValueError(f"cannot use {shorten(str(folder))} as a store: {error.strerror or error}.") from error
     store = open_store(place)
     if store.hash != digest(same):
         other = "; ".join(differences(store.identity, same))
-        raise ValueError(f"the store {str(folder)!r} holds another sweep: {other}. Choose another folder.")
+        raise ValueError(f"the store {shorten(str(folder))} holds another sweep: {other}. Choose another folder.")
     return store
 
 
@@ -149,7 +152,7 @@ def open_store(folder: str | os.PathLike[str]) -> Store:
         if {name: axis_identity(values) for name, values in axes.items()} != manifest.identity["axes"]:
             raise ValueError(f"{AXES} and {MANIFEST} do not belong together")
     except ValueError as error:
-        raise ValueError(f"{str(folder)!r} is not the store of a sweep: {str(error).rstrip('.')}.") from error
+        raise ValueError(f"{shorten(str(folder))} is not the store of a sweep: {str(error).rstrip('.')}.") from error
     return Store(place, manifest, Designs(axes, manifest.zipped))
 
 

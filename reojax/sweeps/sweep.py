@@ -10,6 +10,7 @@ import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
+from reojax._internal.checks import shorten
 from reojax.sweeps.chunks import chunking, compile_chunk
 from reojax.sweeps.devices import Devices, at_most, mesh_of
 from reojax.sweeps.engine import run
@@ -126,7 +127,7 @@ def _check_shard(shard: tuple[int, int] | None, store: object) -> tuple[int, int
         return 0, 1
     pair = shard if isinstance(shard, Sequence) and len(shard) == 2 else (0, 0)
     if not all(isinstance(number, int | np.integer) for number in pair) or not 0 <= pair[0] < pair[1]:
-        raise ValueError(f"`shard` is {shard!r}; it must be (i, n) with 0 <= i < n.")
+        raise ValueError(f"`shard` is {shorten(shard)}; it must be (i, n) with 0 <= i < n.")
     if store is None:
         raise ValueError("a shard's results go into a `store`; give the folder.")
     return pair
@@ -138,5 +139,5 @@ def _check_units(units: Mapping[str, str] | None, designs: Designs, outputs: Out
     for name, unit in labels.items():
         if name not in known or not isinstance(unit, str):
             names = ", ".join(known)
-            raise ValueError(f"units[{name!r}] is {unit!r}; it must be the text of a unit, of one of {names}.")
+            raise ValueError(f"units[{name!r}] is {shorten(unit)}; it must be the text of a unit, of one of {names}.")
     return labels

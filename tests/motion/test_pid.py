@@ -119,7 +119,7 @@ def test_gradients_agree_with_differences():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"sample_time": 0.0}, "`sample_time` is 0.0; it must be positive"),
+        ({"sample_time": 0.0}, "`sample_time` is 0.0; it must be one positive"),
         ({"counts": -1.0}, "`counts` is -1.0"),
         ({"settle": np.nan}, "`settle` is nan"),
         ({"substeps": 0}, "`substeps` is 0"),
