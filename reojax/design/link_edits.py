@@ -84,7 +84,7 @@ def with_joint_inertia(robot: Robot, joint: int | str, inertia: ArrayLike) -> Ro
     return _stretch(robot, link, jnp.sqrt(wanted / present) * across + along, jnp.zeros_like(com))
 
 
-def _stretch(robot: Robot, link: int | str, stretch: jax.Array, fixed: jax.Array) -> Robot:
+def _stretch(robot: Robot, link: int, stretch: jax.Array, fixed: jax.Array) -> Robot:
     """Stretch a link's body about the point `fixed`."""
     inertia = robot.inertia[link]
     spread = 0.5 * jnp.trace(jnp.asarray(inertia)) * jnp.eye(3, dtype=inertia.dtype) - inertia

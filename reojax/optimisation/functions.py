@@ -6,7 +6,7 @@ one program serve them all. JAX runs the blocks one after the other while the ne
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -48,8 +48,8 @@ class Functions(NamedTuple):
     together: Function | None = None
     """To (cost, equality, inequality) at once, instead of the three, where these share most of their work."""
 
-    def parts(self) -> list[Callable[[Array, Any], tuple[list[Array], list[Array], list[Array]]]]:
-        """Functions of x and data, each with what it has of costs, equalities and inequalities."""
+    def parts(self) -> list[Callable[[Array, Any], Any]]:
+        """Functions of x and data to lists of costs, of equalities and of inequalities, each with what it has."""
         call = lambda f, x, data: f(x, data) if self.with_data else f(x)
         one = lambda f, x, data: [jnp.asarray(call(f, x, data))]
         if self.together is not None:
@@ -108,7 +108,7 @@ def _compile(
     dtype: np.dtype,
     n: int,
     structure: Any,
-    types: tuple[Hashable, ...],
+    types: tuple[tuple[tuple[int, ...], Any], ...],
     blocks: tuple[int, int],
 ) -> tuple[Function, Function, int]:
     """Both programs and the number of equalities. Only the last few are kept, as they hold on to a user's functions."""
@@ -120,7 +120,7 @@ def _compile(
         for kinds in found:
             _check(*kinds)
         rows = [array for kind in (1, 2) for kinds in found for array in kinds[kind]]
-        return sum(array for kinds in found for array in kinds[0]), _join(rows, x, 1)
+        return _total([array for kinds in found for array in kinds[0]]), _join(rows, x, 1)
 
     def derivatives(x: Array, data: Any) -> tuple[Array, Array, Array, Array]:
         cost, gradient, rows, jacobian = [], [], ([], []), ([], [])
@@ -136,7 +136,8 @@ def _compile(
             for kind in (0, 1):
                 rows[kind].append(value[ends[kind] : ends[kind + 1]])
                 jacobian[kind].append(slope[ends[kind] : ends[kind + 1]])
-        return sum(cost), _join(rows[0] + rows[1], x, 1), sum(gradient), _join(jacobian[0] + jacobian[1], x, 2)
+        rows, jacobian = _join(rows[0] + rows[1], x, 1), _join(jacobian[0] + jacobian[1], x, 2)
+        return _total(cost), rows, _total(gradient), jacobian
 
     def lower(function: Function, block: int) -> Any:
         leaves = [jax.ShapeDtypeStruct((block, *shape), leaf) for shape, leaf in types]
@@ -187,6 +188,10 @@ def _differentiate(function: Function, x: Array) -> tuple[Array, Array]:
 def _join(parts: list[Array], x: Array, rank: int) -> Array:
     empty = jnp.zeros((0, x.shape[0])[:rank], x.dtype)
     return jnp.concatenate([empty, *(part.astype(x.dtype) for part in parts)])
+
+
+def _total(parts: list[Array]) -> Array:
+    return jnp.stack([jnp.asarray(part) for part in parts]).sum(0)
 
 
 def _power_of_two(count: int) -> int:

@@ -55,7 +55,7 @@ def search(
     )
     enough = run.here[who, None] + SUFFICIENT * _LENGTHS * run.reduction[who, None] + run.rounding[who, None]
     reached = np.where(reached <= enough, reached, np.inf)  # what is not finite is not lower either
-    return points[np.arange(len(who)), reached.argmin(1)], np.isfinite(reached).any(1)
+    return points[np.arange(len(who)), reached.argmin(1)], np.asarray(np.isfinite(reached).any(1))
 
 
 def _second_order_correction(problem: Any, run: Any, who: np.ndarray, ahead: np.ndarray) -> Float[np.ndarray, "r n"]:
@@ -67,7 +67,7 @@ def _second_order_correction(problem: Any, run: Any, who: np.ndarray, ahead: np.
     linear = (jacobian @ d[:, :, None])[:, :, 0] + run.c[who]
     equality = np.arange(linear.shape[1]) < run.equalities
     active = equality[None] | (linear > -_ACTIVE)
-    known = np.isfinite(ahead).all(1)
+    known = np.asarray(np.isfinite(ahead).all(1))
     excess = np.where(active & known[:, None], ahead - linear, 0.0)
     inside = (x + d > problem.lower[who] + _INSIDE) & (x + d < problem.upper[who] - _INSIDE)
     rows = np.where(active[:, :, None] & inside[:, None], jacobian, 0.0)

@@ -28,7 +28,7 @@ from reojax.optimisation.bfgs import update
 from reojax.optimisation.functions import Derivatives, Programs, Values
 from reojax.optimisation.line_search import SUFFICIENT, search
 from reojax.optimisation.merit import largest_violation, merit, predict, stationarity
-from reojax.optimisation.quadratic import solve_quadratic
+from reojax.optimisation.quadratic import Step, solve_quadratic
 from reojax.optimisation.status import Status
 
 RUNNING = -1
@@ -203,7 +203,7 @@ def _begin(problem: Problem, x: np.ndarray, values: Values, slopes: Derivatives)
 
 def _finite(values: Values, gradient: np.ndarray, jacobian: np.ndarray) -> Bool[np.ndarray, " r"]:
     parts = (values.cost[:, None], values.rows, gradient, jacobian.reshape(len(gradient), -1))
-    return np.stack([np.isfinite(part).all(1) for part in parts]).all(0)
+    return np.asarray(np.stack([np.isfinite(part).all(1) for part in parts]).all(0))
 
 
 def _move(
@@ -261,13 +261,10 @@ def _solve(problem: Problem, run: Iterates, who: np.ndarray) -> None:
     """Solve the quadratic programs at x, see who has arrived, and propose the full steps."""
     low, high = problem.lower[who] - run.x[who], problem.upper[who] - run.x[who]
     for i, below, above in zip(who, low, high, strict=True):
-        for attempt in range(2):
-            answer = solve_quadratic(
-                run.hessian[i], run.gradient[i], run.jacobian[i], run.c[i], run.equalities, below, above
-            )
-            if answer.solved or attempt:
-                break
-            run.hessian[i], run.fresh[i] = np.eye(len(below)), True  # B is of no use
+        answer = _program(run, i, below, above)
+        if not answer.solved:  # B is of no use
+            run.hessian[i], run.fresh[i] = np.eye(len(below)), True
+            answer = _program(run, i, below, above)
         if not answer.solved:
             run.status[i] = Status.STALLED
             continue
@@ -290,6 +287,10 @@ def _solve(problem: Problem, run: Iterates, who: np.ndarray) -> None:
     flat = run.restoring[who] & (-run.reduction[who] <= _FLAT * run.here[who]) & (run.status[who] == RUNNING)
     for i in who[flat]:
         _move_aside(problem, run, i)
+
+
+def _program(run: Iterates, i: int, below: np.ndarray, above: np.ndarray) -> Step:
+    return solve_quadratic(run.hessian[i], run.gradient[i], run.jacobian[i], run.c[i], run.equalities, below, above)
 
 
 def _move_aside(problem: Problem, run: Iterates, i: int) -> None:
