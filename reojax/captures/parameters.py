@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable
-from functools import cache
+from functools import lru_cache
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -80,7 +80,7 @@ def _common(robot: Robot, field: str) -> Parameter:
     return Parameter(field, start, _set_all(field), UNITS[field], abs(start) or 1.0, start > 0)
 
 
-@cache
+@lru_cache(maxsize=256)
 def _set_all(field: str) -> Put:
     """One function per field, so that what is compiled for it is found again."""
     return lambda robot, value: robot.replace(**{field: jnp.broadcast_to(value, (robot.joints,))})
@@ -97,7 +97,7 @@ def _entry(robot: Robot, name: str, field: str, index: tuple[int, ...]) -> Param
     return Parameter(name, start, _set_entry(field, index), UNITS[field], size or 1.0, positive)
 
 
-@cache
+@lru_cache(maxsize=256)
 def _set_entry(field: str, index: tuple[int, ...]) -> Put:
     places = {index, (index[0], *index[:0:-1])} if field == "inertia" else {index}
 
