@@ -22,8 +22,9 @@ from reojax.collision.placement import pair_ends
 from reojax.collision.segments import segment_distance
 from reojax.robot import Robot
 
-_ROUND = 0.02
-"""Rounding of the least of several clearances, as a share of the mean sum of a pair's radii."""
+_ROUND = 0.001
+"""Rounding of the least of several clearances, as a share of the mean sum of a pair's radii: hardly any, so that a
+margin that rest barely has can be kept."""
 _SAMPLES = 96
 """Samples of a path by default, one an edge at least."""
 _GROUPS = 12
