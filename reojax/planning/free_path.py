@@ -85,6 +85,8 @@ def free_path(
 ) -> FreePaths:
     """Find a joint path of little travel after which the base has turned by `target` (3, 3); any tree robot.
 
+    At zero angular momentum; for a robot that already spins there is `reojax.righting`.
+
     `free_paths` for one target: arguments and errors are explained there.
     """
     many = free_paths(

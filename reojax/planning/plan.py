@@ -57,6 +57,8 @@ def plan(
 ) -> Plan:
     """Find a sequence of manoeuvres within joint limits after which the base has turned by `target`.
 
+    At zero angular momentum; for a robot that already spins there is `reojax.righting`.
+
     Args:
         robot: the robot.
         target: (3, 3) rotation of the base, final base components to initial ones.
