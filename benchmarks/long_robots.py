@@ -3,7 +3,7 @@
     python benchmarks/long_robots.py           # some minutes; --quick: 3 and 12 joints
 
 Random branched robots with axes along the frame, loops of four edges, default steps; the net rotation of one design
-and of a batch, and its gradient by the path. Compile is tracing and compiling without a cache, in seconds of processor time;
+and of a batch, and its gradient by the path. Compile is tracing and compiling, in seconds of processor time;
 run is processor time of a call for each design, the least of five, in microseconds. Writes long_robots.json.
 """
 
