@@ -14,6 +14,7 @@ Every clearance is proven along the whole path. Figures of a run are in docs/cle
 
 import time
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -65,7 +66,7 @@ def targets(quick: bool) -> list[dict]:
     return rows
 
 
-def _row(found: reojax.Plan | reojax.FreePaths, least: float) -> dict:
+def _row(found: reojax.Plan | reojax.FreePaths, least: Any) -> dict:
     return {
         "converged": bool(found.converged),
         "travel_deg": float(np.rad2deg(found.travel)),

@@ -30,7 +30,7 @@ INERTIA = 0.1
 def main(out: Path, *, quick: bool = False) -> dict:
     """Run, print the table, write `steering.json` to `out`, and return the numbers."""
     file = check_writable(out / "steering.json")
-    releases = 100 if quick else 1000
+    releases = 16 if quick else 1000
     robot = robots.prototype()
     plan = reojax.along(reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120)), "quintic", DURATIONS)
     spread = SPIN * np.diag(np.asarray(reojax.momentum_matrices(robot, np.zeros(3)).A))

@@ -22,7 +22,7 @@ def random_targets(quick: bool) -> dict[str, Any]:
 
 
 def _row(name: str, robot: reojax.Robot, count: int) -> dict[str, Any]:
-    targets = Rotation.random(count, random_state=0).as_matrix()
+    targets = Rotation.random(count, rng=np.random.default_rng(0)).as_matrix()
     begun = time.process_time()
     found = reojax.free_paths(robot, targets, repeats="least", progress=True)
     seconds = time.process_time() - begun

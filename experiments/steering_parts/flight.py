@@ -41,7 +41,7 @@ class Sensors(NamedTuple):
     """Ticks from one orientation to the next."""
     dropped: float
     """Share of orientations that never come."""
-    count: float
+    encoder: float
     """Size of an encoder's count at the joint [rad]."""
     servo: float
     """Time constant of the joints' servos, of second order [s]."""
@@ -91,7 +91,7 @@ def fly(
         past = jnp.concatenate([past[1:], rotation[None]])
         comes = ~gone & (number % sensors.every == 0) & (number >= sensors.latency)
         seen = jnp.where(comes, past[-1 - sensors.latency] @ tilt, jnp.nan)
-        read = jnp.round(after / sensors.count) * sensors.count
+        read = jnp.round(after / sensors.encoder) * sensors.encoder
         reading = Reading(time, read, seen, time - sensors.latency * TICK)
         state, references = law.update(state, reading)
         change = jnp.abs(references.theta - trajectory.at(time).theta).max()

@@ -241,7 +241,16 @@ def Steering(
     table = {name: one(value) for name, value in gain_table(gains).items()} | {"momentum": h, "to_end": gains.to_end}
     table["drift"] = _drift(robot, chosen, gains, h)
     return SteeringLaw(
-        robot, trajectory, table, jnp.diag(one(std) ** 2), *map(one, (noise, wander, tau, settle, largest)), chosen
+        robot=robot,
+        trajectory=trajectory,
+        table=table,
+        start_covariance=jnp.diag(one(std) ** 2),
+        noise=one(noise),
+        wander=one(wander),
+        tau=one(tau),
+        settle=one(settle),
+        largest=one(largest),
+        parameters=chosen,
     )
 
 

@@ -394,7 +394,8 @@ class _State(NamedTuple):
 @partial(jax.jit, static_argnums=(1, 2))
 def _solve(task: _Task, pieces: int, max_steps: int, points, goals, momenta, durations, tolerance):
     one = partial(_solve_one, task, pieces, max_steps)
-    return jax.vmap(one, (0, 0, 0, 0, None))(*map(jnp.asarray, (points, goals, momenta, durations)), tolerance)
+    points, goals, momenta, durations = map(jnp.asarray, (points, goals, momenta, durations))
+    return jax.vmap(one, (0, 0, 0, 0, None))(points, goals, momenta, durations, tolerance)
 
 
 def _solve_one(task: _Task, pieces: int, max_steps: int, points, goal, momentum, duration, tolerance):
@@ -428,7 +429,7 @@ def _solve_one(task: _Task, pieces: int, max_steps: int, points, goal, momentum,
     def limited(state: Array) -> Array:
         """What must stay within bounds at one node, of `(theta, theta_dot, theta_ddot, h)`."""
         theta, rate, acceleration, h = jnp.split(state, np.cumsum([robot.joints] * 3))
-        parts = [theta]
+        parts: list[Any] = [theta]
         if task.motors is not None:
             load = joint_load(robot, theta, rate, acceleration, momentum=h)
             squared, linear, constant = demand(robot, task.motors, rate, load, soft=_SOFT)
@@ -437,13 +438,13 @@ def _solve_one(task: _Task, pieces: int, max_steps: int, points, goal, momentum,
             parts.append(clearances(robot, theta))
         return jnp.concatenate(parts)
 
-    low, high = [robot.lower], [robot.upper]
+    bounds: list[tuple[Any, Any]] = [(robot.lower, robot.upper)]
     if task.motors is not None:
-        low, high = [*low, -jnp.ones(robot.joints, dtype)], [*high, jnp.ones(robot.joints, dtype)]
+        bounds.append((-jnp.ones(robot.joints, dtype), jnp.ones(robot.joints, dtype)))
     if task.clearance is not None:
         count = len(robot.collision_pairs)
-        low, high = [*low, jnp.full(count, task.clearance)], [*high, jnp.full(count, jnp.inf)]
-    low, high = jnp.concatenate(low)[None], jnp.concatenate(high)[None]
+        bounds.append((jnp.full(count, task.clearance), jnp.full(count, jnp.inf)))
+    low, high = (jnp.concatenate(side)[None] for side in zip(*bounds, strict=True))
     plain = task.motors is None and task.clearance is None
     strength = 30.0
     lift = jnp.einsum("kop,jf->kojpf", values[:, :, 1:-1], carry).reshape(len(values), 3 * robot.joints, size)
