@@ -24,14 +24,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from reojax import so3
 from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.captures.capture import Capture
-from reojax.captures.comparison import BLOCK, align_frames, fill_gaps, interpolate
+from reojax.captures.comparison import align_frames, interpolate
+from reojax.captures.orientation import chain, edge_turn, fill_gaps, fill_up, steps_needed
 from reojax.captures.parameters import Parameter, Put, resolve
-from reojax.mechanics.integrators import GAUSS_4, magnus4
-from reojax.mechanics.momentum import connection
 from reojax.robot import Robot
 
 SINGULAR = 1e-6
@@ -164,8 +162,7 @@ class _Problem:
         self.seen = np.flatnonzero(capture.seen_rotation)
         self.measured = np.asarray(capture.rotation)[self.seen]
         self.edges = len(theta) - 1
-        ends = np.minimum(np.arange(-(-self.edges // BLOCK) * BLOCK + 1), self.edges)
-        self.theta = theta[ends]
+        self.theta, self.steps = fill_up(theta), steps_needed(robot, theta)
         self.scale = np.array([p.scale for p in fitted])
         unknowns = len(fitted) + 3 + clock
         if 3 * len(self.seen) <= unknowns:
@@ -206,13 +203,9 @@ class _Problem:
 
     def _orientation(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Orientation at every frame, and the effect of parameters and ends of each edge on all later ones."""
-        turns, effect = _edges(tuple(p.put for p in self.fitted), x, self.robot, self.theta)
-        turns, effect = np.asarray(turns)[: self.edges], np.asarray(effect)[: self.edges]
-        turned = np.empty((self.edges + 1, 3, 3))
-        turned[0] = np.eye(3)
-        for k, turn in enumerate(turns):
-            turned[k + 1] = turned[k] @ turn
-        return turned, turned[1:] @ effect
+        turns, effect = _edges(tuple(p.put for p in self.fitted), x, self.robot, self.theta, self.steps)
+        turned = chain(np.asarray(turns)[: self.edges])
+        return turned, turned[1:] @ np.asarray(effect)[: self.edges]
 
     def _state(self, x: np.ndarray, frame: np.ndarray, offset: float) -> _State:
         from scipy.spatial.transform import Rotation
@@ -329,23 +322,22 @@ def _joint_noise(capture: Capture) -> float:
     return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(70)) if differences.size else 0.0
 
 
-@partial(jax.jit, static_argnums=0)
-def _edges(puts: tuple[Put, ...], x: Array, robot: Robot, theta: Array) -> tuple[Array, Array]:
+@partial(jax.jit, static_argnums=(0, 4))
+def _edges(puts: tuple[Put, ...], x: Array, robot: Robot, theta: Array, steps: int) -> tuple[Array, Array]:
     """Turn of the base along every edge (e, 3, 3), and its derivative (e, 3, p + 2 j) in the frame at its end."""
     joints = theta.shape[1]
 
-    def exponent(numbers: Array) -> Array:
-        """Rotation vector of the edge."""
+    def turn(numbers: Array) -> Array:
         changed: Any = robot
         for k, put in enumerate(puts):
             changed = put(changed, numbers[k])
         start, end = jnp.split(numbers[len(puts) :], [joints])
-        nodes = jnp.stack([start + share * (end - start) for share in GAUSS_4])
-        return magnus4(*jax.vmap(lambda node: connection(changed, node) @ (end - start))(nodes))
+        return edge_turn(changed, start, end, steps)
 
     def edge(start: Array, end: Array) -> tuple[Array, Array]:
         numbers = jnp.concatenate([jnp.asarray(x), start, end])
-        phi = exponent(numbers)
-        return so3.exp(phi), so3.left_jacobian(-phi) @ jax.jacfwd(exponent)(numbers)
+        turned = turn(numbers)
+        change = jnp.einsum("ba,bcn->acn", turned, jax.jacfwd(turn)(numbers))  # R^T dR = hat(delta)
+        return turned, jnp.stack([change[2, 1], change[0, 2], change[1, 0]])
 
     return jax.vmap(edge)(jnp.asarray(theta[:-1]), jnp.asarray(theta[1:]))

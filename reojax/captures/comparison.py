@@ -16,9 +16,9 @@ from jaxtyping import Float
 from reojax._internal.arrays import Array, as_numbers
 from reojax._internal.checks import instance, number
 from reojax.captures.capture import Capture
+from reojax.captures.mistakes import LARGE, suspects
+from reojax.captures.orientation import fill_gaps, orientations
 from reojax.mechanics.attitude import tilt_and_roll, zxz_beside, zxz_without_jumps
-from reojax.mechanics.holonomy import rotation_history
-from reojax.path import polygon
 from reojax.robot import Robot
 
 _SHIFTS_PER_MOTION = 200
@@ -26,8 +26,6 @@ _LONGEST = 100
 """Largest ratio of the capture's duration to the motion's in which the motion is looked for."""
 _AT_REST = 0.02
 """Turn of the base within which it counts as not having started [rad]."""
-BLOCK = 256
-"""Sampled paths are filled up to a multiple of this many edges, so that few programs are compiled."""
 
 
 class Simulated(Protocol):
@@ -87,6 +85,14 @@ class Comparison(NamedTuple):
     tilt_roll_rms: Float[np.ndarray, "3"]
     angle_rms: float
     """RMS angle between the two orientations [rad]."""
+    hint: str = ""
+    """Where the error is above 20 degrees: the usual mistake in the capture without which it would fit, if there is."""
+
+    @property
+    def worst_rms(self) -> float:
+        """The larger one of `angle_rms` and the joints' RMS, of those that there are [rad]."""
+        there = [error for error in (self.angle_rms, *self.theta_rms) if np.isfinite(error)]
+        return float(max(there, default=np.nan))
 
 
 def joints_simulated(robot: Robot, capture: Capture) -> Sampled:
@@ -95,35 +101,14 @@ def joints_simulated(robot: Robot, capture: Capture) -> Sampled:
     Gaps of a joint are filled by monotone cubics (PCHIP) between the frames in which it was seen, and held at the ends.
 
     Raises:
-        ValueError: if the capture has no joint angles, other ones than the robot's, or a joint was never seen.
+        ValueError: if the capture has no joint angles, other ones than the robot's, a joint was never seen, or goes
+            more than 32 rad between two frames.
     """
     _check_joints(robot, capture)
     if capture.theta is None:
         raise ValueError("the capture has no joint angles, so its orientation cannot be simulated from them.")
     theta = fill_gaps(capture)
-    edges = -(-(len(theta) - 1) // BLOCK) * BLOCK
-    padded = np.concatenate([theta, np.repeat(theta[-1:], edges + 1 - len(theta), axis=0)])
-    history = np.asarray(rotation_history(robot, polygon(padded), samples=1), float)
-    return Sampled(capture.time, theta, history[: len(theta)])
-
-
-def fill_gaps(capture: Capture) -> Float[np.ndarray, "m j"]:
-    """Joint angles of a capture, gaps filled in [rad].
-
-    Raises:
-        ValueError: if a joint was never seen.
-    """
-    from scipy.interpolate import PchipInterpolator
-
-    theta = np.array(capture.theta, float)
-    for k, seen in enumerate(capture.seen_theta.T):
-        if not seen.any():
-            raise ValueError(f"joint {k} was seen in no frame.")
-        gaps = np.clip(capture.time[~seen], capture.time[seen][0], capture.time[seen][-1])
-        if seen.sum() > 1:
-            theta[~seen, k] = PchipInterpolator(capture.time[seen], theta[seen, k])(gaps)
-        theta[~seen, k] = theta[~seen, k] if seen.sum() > 1 else theta[seen, k][0]
-    return theta
+    return Sampled(capture.time, theta, orientations(robot, theta))
 
 
 def compare(
@@ -143,21 +128,46 @@ def compare(
         ValueError: if capture and robot or motion do not fit together, or there is nothing to compare.
     """
     _check_joints(robot, capture)
+    if motion is None and not capture.seen_rotation.any():
+        raise ValueError("the capture has no orientation, and no motion is given: there is nothing to compare.")
+    if motion is not None:
+        motion = _sampled(motion)
+        if motion.theta.shape[1] != robot.joints:
+            raise ValueError(f"`motion` has {motion.theta.shape[1]} joints; {robot.name!r} has {robot.joints}.")
+    if offset is not None:
+        offset = float(number("offset", offset, unit="s"))
+    found = _compared(robot, capture, motion, offset)
+    return found._replace(hint=_hint(robot, capture, motion, offset, found.worst_rms))
+
+
+def _compared(robot: Robot, capture: Capture, motion: Sampled | None, offset: float | None) -> Comparison:
+    """The comparison, of checked input."""
+    simulated = joints_simulated(robot, capture) if motion is None else motion
     if motion is None:
-        if not capture.seen_rotation.any():
-            raise ValueError("the capture has no orientation, and no motion is given: there is nothing to compare.")
-        simulated = joints_simulated(robot, capture)
         capture = capture._replace(theta=None)
-    else:
-        simulated = _sampled(motion)
-        if simulated.theta.shape[1] != robot.joints:
-            raise ValueError(f"`motion` has {simulated.theta.shape[1]} joints; {robot.name!r} has {robot.joints}.")
-    found = False
-    if offset is None:
-        offset, found = align(capture, simulated)
-    else:
-        offset = number("offset", offset, unit="s")
-    return _comparison(capture, simulated, float(offset), found)
+    best, found = align(capture, simulated) if offset is None else (offset, False)
+    return _comparison(capture, simulated, best, found)
+
+
+def _hint(robot: Robot, capture: Capture, motion: Sampled | None, offset: float | None, error: float) -> str:
+    """The mistake without which the error is least, if it is small then and at most a third of what it was.
+
+    The first one that leaves less than a tenth is taken at once.
+    """
+    if not error > LARGE:
+        return ""
+    least, hint = min(LARGE, error / 3), ""
+    for what, mended in suspects(capture):
+        try:
+            left = _compared(robot, mended, motion, offset).worst_rms
+        except ValueError:  # angles that are far too large when mended
+            continue
+        if left < least:
+            least = left
+            hint = f"{what}; then the RMS error is {np.rad2deg(left):.3g} degrees instead of {np.rad2deg(error):.3g}"
+        if left < error / 10:
+            break
+    return hint
 
 
 def _sampled(motion: Simulated) -> Sampled:

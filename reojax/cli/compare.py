@@ -106,6 +106,7 @@ def _report(
         "rms_zxz_rad": _numbers(comparison.zxz_rms),
         "rms_tilt_roll_rad": _numbers(comparison.tilt_roll_rms),
         "rms_angle_rad": _numbers([comparison.angle_rms])[0],
+        "hint": comparison.hint,
         "last_tilt_roll_measured_rad": _numbers(comparison.measured_tilt_roll[last]),
         "last_tilt_roll_simulated_rad": _numbers(comparison.simulated_tilt_roll[last]),
         "calibration": None if fit is None else _calibration(fit),
@@ -189,6 +190,8 @@ def _text(report: dict[str, Any]) -> str:
     if measured is not None:
         turned = f"measured {math.degrees(measured):.2f} deg, simulated {math.degrees(simulated):.2f} deg"
         lines += ["", f"roll at the end: {turned}"]
+    if r["hint"]:
+        lines += ["", f"hint: {r['hint']}"]
     if r["calibration"] is not None:
         lines += ["", *_fit_text(r["calibration"])]
     if r["picture"] is not None:

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import reojax
 from reojax import plot, robots
-from reojax.captures import comparison
+from reojax.captures import comparison, orientation
 from reojax.cli import main
 from reojax.mechanics.attitude import tilt_and_roll, zxz_beside, zxz_without_jumps
 from reojax.robots.random import random_robot
@@ -232,7 +232,7 @@ def test_a_capture_at_rest_has_no_offset():
 def test_gaps_in_the_joints_are_filled():
     holes = THETA.copy()
     holes[60:64] = holes[100:103, 1] = np.nan
-    filled = comparison.fill_gaps(reojax.make_capture(TIME, holes))
+    filled = orientation.fill_gaps(reojax.make_capture(TIME, holes))
     np.testing.assert_allclose(filled, THETA, atol=2e-3)
     np.testing.assert_array_equal(filled[np.isfinite(holes)], holes[np.isfinite(holes)])
 
