@@ -107,3 +107,7 @@ def check_layout(layout: Layout) -> None:
             raise ValueError(f"the layout names joint {joint}; its robot has joints 0 to {layout.joints - 1}.")
     if len(set(used)) != len(used):
         raise ValueError(f"the layout uses joints {tuple(used)}; each joint may play only one part.")
+
+
+BY_NAME = {"a": manoeuvre_a, "b": manoeuvre_b}
+"""The manoeuvres by the names that the command line has for them."""

@@ -12,13 +12,27 @@ if TYPE_CHECKING:
     from reojax.robot import Robot
 
 
+def add_amplitudes(parser: argparse.ArgumentParser, *, default: str | None = "a", otherwise: str = "") -> None:
+    """Declare the options of a manoeuvre: which, `default` or none, and its amplitudes.
+
+    Args:
+        parser: gets the options.
+        default: the manoeuvre that is meant where none is given; None for no manoeuvre.
+        otherwise: said of the amplitudes, such as when they are not taken from elsewhere.
+    """
+    add = parser.add_argument
+    parts = "a: the distal joints twist opposite ways; b: the same way" + (" [%(default)s]" if default else "")
+    add("--manoeuvre", choices=("a", "b"), default=default, help=parts)
+    for name, angle, what in (
+        ("--twist", 270.0, "twist of the distal joints"),
+        ("--bend", 120.0, "bend of the centre joint"),
+    ):
+        add(name, type=degrees, default=angle, metavar="DEG", help=f"{what}{otherwise} [%(default)g]")
+
+
 def add_manoeuvre(parser: argparse.ArgumentParser, *, plan: bool = True) -> None:
     """Declare the options that say which manoeuvre of which robot; with `plan`, or which plan."""
-    add = parser.add_argument
-    parts = "a: the distal joints twist opposite ways; b: the same way [%(default)s]"
-    add("--manoeuvre", choices=("a", "b"), default="a", help=parts)
-    add("--twist", type=degrees, default=270.0, metavar="DEG", help="twist of the distal joints [%(default)g]")
-    add("--bend", type=degrees, default=120.0, metavar="DEG", help="bend of the centre joint [%(default)g]")
+    add_amplitudes(parser)
     add_robot(parser)
     if plan:
         add_plan_file(parser)
@@ -48,11 +62,10 @@ def path_of(robot: "Robot", args: argparse.Namespace) -> "Path":
     """
     import numpy as np
 
-    from reojax.manoeuvres import manoeuvre_a, manoeuvre_b
+    from reojax.manoeuvres import BY_NAME
     from reojax.robot import layout_of
 
-    manoeuvre = {"a": manoeuvre_a, "b": manoeuvre_b}[args.manoeuvre]
-    return manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), layout_of(robot))
+    return BY_NAME[args.manoeuvre](np.deg2rad(args.twist), np.deg2rad(args.bend), layout_of(robot))
 
 
 def edge_names(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[str, ...]:

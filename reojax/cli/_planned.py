@@ -1,26 +1,22 @@
-"""The options that plan a motion: a manoeuvre, a time law and durations; and the trajectory they make."""
+"""The options that plan a motion: a time law and durations along a path; and the trajectory they make."""
 
 import argparse
 from typing import TYPE_CHECKING
 
-from reojax.cli._arguments import LONGEST, SHORTEST, degrees
+from reojax.cli._arguments import LONGEST, SHORTEST
 
 if TYPE_CHECKING:
     import numpy as np
 
     from reojax.motion.trajectory import Trajectory
     from reojax.path import Path
-    from reojax.robot import Robot
 
 
-def add_plan(parser: argparse.ArgumentParser, *, manoeuvre: str | None) -> None:
-    """Declare the options; `manoeuvre` is the default, None for no plan at all."""
-    add = parser.add_argument
-    parts = "a: the distal joints twist opposite ways; b: the same way" + (" [%(default)s]" if manoeuvre else "")
-    add("--manoeuvre", choices=("a", "b"), default=manoeuvre, help=parts)
-    add("--twist", type=degrees, default=270.0, metavar="DEG", help="twist of the distal joints [%(default)g]")
-    add("--bend", type=degrees, default=120.0, metavar="DEG", help="bend of the centre joint [%(default)g]")
-    add("--law", default="quintic", metavar="NAME", help="time law; a wrong name lists them [%(default)s]")
+def add_timing(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument(
+        "--law", default="quintic", metavar="NAME", help="time law; a wrong name lists them [%(default)s]"
+    )
     add_duration(parser)
 
 
@@ -46,23 +42,16 @@ def durations_of(path: "Path", seconds: list[float]) -> "np.ndarray":
     return seconds[0] * angles / angles.sum() if len(seconds) == 1 else np.array(seconds)
 
 
-def plan_motion(robot: "Robot", args: argparse.Namespace, path: "Path | None" = None) -> "Trajectory":
-    """Trajectory of the joints that the options ask for, along `path` or their manoeuvre.
+def plan_motion(path: "Path", args: argparse.Namespace) -> "Trajectory":
+    """Trajectory of the joints along `path` that the options ask for.
 
     Raises:
-        ValueError: if the robot has no such manoeuvre, or law or durations are none.
+        ValueError: if law or durations are none.
     """
-    import numpy as np
-
-    from reojax.manoeuvres import manoeuvre_a, manoeuvre_b
     from reojax.motion.trajectory import along
-    from reojax.robot import layout_of
 
     if args.duration is None:
         raise ValueError("--duration is missing: seconds of it all, or of each edge.")
-    if path is None:
-        manoeuvre = {"a": manoeuvre_a, "b": manoeuvre_b}[args.manoeuvre]
-        path = manoeuvre(np.deg2rad(args.twist), np.deg2rad(args.bend), layout_of(robot))
     return along(path, args.law, durations_of(path, args.duration))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from reojax import so3
 from reojax._internal.arrays import Array
-from reojax.manoeuvres import manoeuvre_a, manoeuvre_b
+from reojax.manoeuvres import BY_NAME
 from reojax.mechanics.holonomy import DEFAULT_STEPS, rotation_history
 from reojax.path import joint_travel
 from reojax.robot import Robot, layout_of
@@ -46,7 +46,7 @@ def turn_function(
     longest = max(float(np.abs(values).max()) for values in amplitudes.values())
     samples = DEFAULT_STEPS * max(1, int(np.ceil(longest / _RESOLVED - 1e-9)))
     fixed = {name: values[0] for name, values in amplitudes.items()}
-    path_of = {"a": manoeuvre_a, "b": manoeuvre_b}[manoeuvre]
+    path_of = BY_NAME[manoeuvre]
     changes = {"end_inertia": with_end_inertia, "gear": with_gear_ratio, "rotor_inertia": with_rotor_inertia}
 
     def function(**design: jax.Array) -> dict[str, jax.Array]:

@@ -6,14 +6,17 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, version
+from reojax.cli._limits import joints_beyond_limits, limits_text
+from reojax.cli._manoeuvre import add_amplitudes, path_of
 from reojax.cli._page import add_page, check_page, write_page
-from reojax.cli._planned import add_plan, plan_motion
+from reojax.cli._planned import add_timing, plan_motion
 from reojax.cli._robot import add_robot, robot_of
 
 if TYPE_CHECKING:
     from reojax.captures.calibration import Calibration
     from reojax.captures.capture import Capture
     from reojax.captures.comparison import Comparison, Sampled
+    from reojax.path import Path
     from reojax.robot import Robot
 
 
@@ -22,7 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("capture", metavar="CAPTURE.csv", help="time, joint angles and/or orientation of link 1; see docs/captures.md")
     add_robot(parser)
-    add_plan(parser, manoeuvre=None)
+    add_amplitudes(parser, default=None)
+    add_timing(parser)
     add("--angles", choices=("deg", "rad"), help="unit of angles whose header does not say it")
     add("--offset", type=float, metavar="S", help="time of the capture at which the motion starts [fitted]")
     fitted = "fit these numbers of the robot to the capture first, such as end_inertia,rotor_inertia or com[0,2]"
@@ -84,7 +88,8 @@ def _report(
     if args.calibrate is not None:
         fit = calibrate(robot, capture, _names(args.calibrate))
         robot = fit.robot
-    motion, source = _motion(robot, args)
+    path = None if args.manoeuvre is None else path_of(robot, args)
+    motion, source = (None, "the measured joint angles") if path is None else _motion(robot, path, args)
     comparison = compare(robot, capture, motion, offset=args.offset)
     seen = np.flatnonzero(capture.seen_rotation)
     last = int(seen[-1]) if seen.size else len(capture.time) - 1
@@ -102,6 +107,7 @@ def _report(
         "offset_s": comparison.offset,
         "offset_found": comparison.offset_found,
         "joints": list(robot.joint_names),
+        "joints_beyond_limits": [] if path is None else joints_beyond_limits(robot, [path]),
         "rms_theta_rad": _numbers(comparison.theta_rms),
         "rms_zxz_rad": _numbers(comparison.zxz_rms),
         "rms_tilt_roll_rad": _numbers(comparison.tilt_roll_rms),
@@ -116,17 +122,15 @@ def _report(
     return report, robot, comparison
 
 
-def _motion(robot: "Robot", args: argparse.Namespace) -> tuple["Sampled | None", str]:
-    """The planned motion, None where the measured joints take its place; and its name."""
-    if args.manoeuvre is None:
-        return None, "the measured joint angles"
+def _motion(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple["Sampled", str]:
+    """The planned motion, and its name."""
     import jax
     import numpy as np
 
     from reojax.captures.comparison import Sampled
     from reojax.motion.release import released
 
-    trajectory = plan_motion(robot, args)
+    trajectory = plan_motion(path, args)
     motion = released(robot, trajectory, steps=64)
     theta = jax.vmap(trajectory.at)(motion.time).theta
     name = f"manoeuvre {args.manoeuvre.upper()}, twist {args.twist:g} deg, bend {args.bend:g} deg, {args.law}"
@@ -190,6 +194,7 @@ def _text(report: dict[str, Any]) -> str:
     if measured is not None:
         turned = f"measured {math.degrees(measured):.2f} deg, simulated {math.degrees(simulated):.2f} deg"
         lines += ["", f"roll at the end: {turned}"]
+    lines += limits_text(r["config"]["robot"], r["joints_beyond_limits"])
     if r["hint"]:
         lines += ["", f"hint: {r['hint']}"]
     if r["calibration"] is not None:

@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, version
-from reojax.cli._plan_file import add_plan_file, saved_plan
-from reojax.cli._planned import add_plan, plan_motion
-from reojax.cli._robot import add_robot, robot_of
+from reojax.cli._limits import joints_beyond_limits, limits_text
+from reojax.cli._manoeuvre import add_manoeuvre, robot_and_path
+from reojax.cli._planned import add_timing, plan_motion
 
 if TYPE_CHECKING:
     from reojax.path import Path
@@ -22,9 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `reojax export`."""
     add = parser.add_argument
     add("file", metavar="FILE", help="to write: .csv, or .yaml, .yml or .json for ROS 2")
-    add_robot(parser)
-    add_plan_file(parser)
-    add_plan(parser, manoeuvre="a")
+    add_manoeuvre(parser)
+    add_timing(parser)
     add("--rate", type=_positive, default=200.0, metavar="HZ", help="points per second, about [%(default)g]")
     add("--delay", type=_delay, default=0.0, metavar="S", help="time before the first point [%(default)g]")
     add("--torques", action="store_true", help="write the joint torques in free fall too")
@@ -39,23 +38,22 @@ def run(args: argparse.Namespace) -> None:
     session.start()
     try:
         check_trajectory(args.file)
-        saved = saved_plan(args)
-        robot, path = (robot_of(args.robot), None) if saved is None else (saved.robot, saved.path)
-        report = _write(robot, path, args)
+        report = _write(*robot_and_path(args), args)
     except ValueError as error:
         raise BadInput(f"reojax export: {error}") from error
-    text = f"{report['points']} points in {report['duration_s']:.6g} s, written to {args.file}"
-    print(json.dumps(report, indent=2, allow_nan=False) if args.json else text)
+    lines = [f"{report['points']} points in {report['duration_s']:.6g} s, written to {args.file}"]
+    lines += limits_text(args.robot, report["joints_beyond_limits"])
+    print(json.dumps(report, indent=2, allow_nan=False) if args.json else "\n".join(lines))
 
 
-def _write(robot: "Robot", path: "Path | None", args: argparse.Namespace) -> dict[str, Any]:
+def _write(robot: "Robot", path: "Path", args: argparse.Namespace) -> dict[str, Any]:
     import jax
     import numpy as np
 
     from reojax.files.trajectories import write_trajectory
     from reojax.mechanics.dynamics import inverse_dynamics
 
-    trajectory = plan_motion(robot, args, path)
+    trajectory = plan_motion(path, args)
     duration = float(trajectory.duration)
     steps = math.ceil(duration * args.rate - 1e-9)
     if steps >= LARGEST:
@@ -70,7 +68,7 @@ def _write(robot: "Robot", path: "Path | None", args: argparse.Namespace) -> dic
         "command": "export",
         "version": version(),
         "config": {
-            "robot": robot.name if args.plan else args.robot,
+            "robot": args.robot,
             "plan": args.plan,
             "manoeuvre": args.manoeuvre,
             "twist_deg": args.twist,
@@ -82,6 +80,7 @@ def _write(robot: "Robot", path: "Path | None", args: argparse.Namespace) -> dic
         "points": len(time),
         "duration_s": duration,
         "joints": list(robot.joint_names),
+        "joints_beyond_limits": joints_beyond_limits(robot, [path]),
         "file": args.file,
     }
 

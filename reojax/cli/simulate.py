@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, version
 from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
+from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path
 from reojax.cli._motion import LAW, check_law, motion_of, motion_report, motion_text
 from reojax.cli._motors import add_motors, momentum
@@ -114,7 +115,6 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
     certificate, history, rotation, *parts = jax.tree.map(np.asarray, compute(path))
     vector, euler, angle, quaternion = parts
     roll = tilt_and_roll(history)[-1, 2]
-    beyond = (path.waypoints < robot.lower - 1e-9) | (path.waypoints > robot.upper + 1e-9)
     report = {
         "command": "simulate",
         "version": version(),
@@ -143,7 +143,7 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
             "halving_rad": float(certificate.halving),
             "endpoint_rad": float(certificate.endpoint),
         },
-        "joints_beyond_limits": [robot.joint_names[k] for k in np.flatnonzero(np.any(beyond, axis=0))],
+        "joints_beyond_limits": joints_beyond_limits(robot, [path]),
         "picture": args.out,
         "page": args.html,
     }
@@ -176,8 +176,7 @@ def _text(report: dict[str, Any], args: argparse.Namespace) -> str:
         ("endpoint", "endpoint_rad", "rad", "distance from where the measured motion ends"),
     ):
         lines.append(f"  {label:<19}{figures[key]:>9.1e} {unit:<5}{meaning}")
-    if report["joints_beyond_limits"]:
-        lines += ["", f"beyond the joint limits of {args.robot}: {', '.join(report['joints_beyond_limits'])}"]
+    lines += limits_text(args.robot, report["joints_beyond_limits"])
     if report["clearance"] is not None:
         lines += clearance_text(report["clearance"])
     if "motion" in report:

@@ -5,12 +5,21 @@ import json
 import re
 import sys
 from math import prod
+from typing import TYPE_CHECKING
 
 from reojax._internal.display_units import display_unit
-from reojax.cli._arguments import BadInput, degrees
+from reojax.cli._arguments import BadInput
 from reojax.cli._axes import AXES, axis, check_names
+from reojax.cli._limits import joints_beyond_limits, limits_text
+from reojax.cli._manoeuvre import add_amplitudes
 from reojax.cli._results import add_files, check_files, complaint, table, write
 from reojax.cli._robot import add_robot, robot_of
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from reojax.path import Path
+    from reojax.robot import Robot
 
 OUTPUTS = ("roll", "off_axis", "angle", "travel")
 """Results by name; all of them are angles."""
@@ -23,10 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     names = ", ".join(f"{name} [{unit}]" if unit else name for name, unit in units)
     add("axes", nargs="+", type=axis, metavar="AXIS", help=f"NAME=START:STOP:COUNT or NAME=VALUE,VALUE,...: {names}")
     add_robot(parser)
-    parts = "a: the distal joints twist opposite ways; b: the same way [%(default)s]"
-    add("--manoeuvre", choices=("a", "b"), default="a", help=parts)
-    add("--twist", type=degrees, default=270.0, metavar="DEG", help="twist, where it is no axis [%(default)g]")
-    add("--bend", type=degrees, default=120.0, metavar="DEG", help="bend, where it is no axis [%(default)g]")
+    add_amplitudes(parser, otherwise=", where it is no axis")
     add("--outputs", type=outputs, default=OUTPUTS, metavar="NAMES", help=f"results [{','.join(OUTPUTS)}]")
     add_files(parser)
     add("--store", metavar="FOLDER", help="keep finished chunks here, and go on from them when run again")
@@ -57,7 +63,8 @@ def run(args: argparse.Namespace) -> None:
         axes = {axis.name: axis.values() for axis in args.axes}
         fixed = {"twist": np.deg2rad([args.twist]), "bend": np.deg2rad([args.bend])}
         amplitudes = {name: axes.get(name, value) for name, value in fixed.items()}
-        function = turn_function(robot_of(args.robot), args.manoeuvre, args.outputs, amplitudes)
+        robot = robot_of(args.robot)
+        function = turn_function(robot, args.manoeuvre, args.outputs, amplitudes)
         units = {name: AXES[name].unit for name in axes if AXES[name].unit} | dict.fromkeys(args.outputs, "rad")
         options = (args.chunk_size, args.store, args.devices, not args.quiet, units, args.shard)
         found = run_sweep(function, axes, *options)
@@ -68,12 +75,25 @@ def run(args: argparse.Namespace) -> None:
             else:
                 report = write(found, args, f"Manoeuvre {args.manoeuvre.upper()} on {args.robot}")
                 text = table(report)
+            beyond = joints_beyond_limits(robot, _outermost(robot, args.manoeuvre, amplitudes))
+            report["joints_beyond_limits"] = beyond
+            text = "\n".join([text, *limits_text(args.robot, beyond)])
             print(json.dumps(report, indent=2, allow_nan=False) if args.json else text)
     except ValueError as error:
         raise BadInput(f"reojax sweep: {error}") from error
     if found.bad:
         print(complaint(found), file=sys.stderr)
         raise SystemExit(1)
+
+
+def _outermost(robot: "Robot", manoeuvre: str, amplitudes: dict[str, "np.ndarray"]) -> list["Path"]:
+    """The manoeuvre at the least and at the largest amplitudes: no design goes farther, either way."""
+    from reojax.manoeuvres import BY_NAME
+    from reojax.robot import layout_of
+
+    twist, bend = amplitudes["twist"], amplitudes["bend"]
+    ends = ((twist.min(), bend.min()), (twist.max(), bend.max()))
+    return [BY_NAME[manoeuvre](*angles, layout_of(robot)) for angles in ends]
 
 
 def outputs(text: str) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from reojax._internal.display_units import RPM
 from reojax.cli._arguments import BadInput, version
 from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
+from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path
 from reojax.cli._motors import add_motors, motor_at
 
@@ -98,6 +99,7 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
         "fall_s": FALL,
         "available_s": AVAILABLE,
         "fits": total <= AVAILABLE,
+        "joints_beyond_limits": joints_beyond_limits(robot, [path]),
         "picture": args.out,
     }
     return report, motion
@@ -144,6 +146,7 @@ def _text(report: dict[str, Any], args: argparse.Namespace) -> str:
         f"{1000 * report['available_s']:.0f} ms.",
         "Peaks are those of the joint that sets the time; at: share of the edge where it does.",
     ]
+    lines += limits_text(args.robot, report["joints_beyond_limits"])
     if report["clearance"] is not None:
         lines += clearance_text(report["clearance"])
     if report["picture"] is not None:

@@ -6,6 +6,7 @@ from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput
+from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_manoeuvre, heading, path_of
 from reojax.cli._motors import seconds
 from reojax.cli._robot import robot_of
@@ -49,13 +50,16 @@ def run(args: argparse.Namespace) -> None:
             return
         out = args.out or "turn.html"
         check_ending(out, "page", ("html", "htm"))
-        written = _write(args, out)
+        written, note = _write(args, out)
     except ValueError as error:
         raise BadInput(f"reojax view: {error}") from error
     print(f"page in {written} ({written.stat().st_size / 1e3:.0f} kB); open it in a browser, it needs no network")
+    if note:
+        print("\n".join(note))
 
 
-def _write(args: argparse.Namespace, out: str) -> File:
+def _write(args: argparse.Namespace, out: str) -> tuple[File, list[str]]:
+    """Write the page; return where it is, and the joint limits that are exceeded, in lines."""
     import numpy as np
 
     from reojax.motion.simulation import simulate
@@ -72,6 +76,7 @@ def _write(args: argparse.Namespace, out: str) -> File:
             raise ValueError(f"{args.beside!r} is a plan for {other['config']['robot']!r}, not for {name!r}.")
         shown.append(_path(robot, other, args.beside))
         names.append(str(other["config"].get("target", args.beside)))
+    note = limits_text(name, joints_beyond_limits(robot, shown))
     if args.duration is not None:
         for k, path in enumerate(shown):
             angles = np.abs(np.diff(path.waypoints, axis=0)).max(axis=1)
@@ -81,7 +86,7 @@ def _write(args: argparse.Namespace, out: str) -> File:
             moving = type(path)(np.asarray(path.waypoints)[kept])
             angles = angles[angles > 0]
             shown[k] = simulate(robot, moving, durations=args.duration * angles / angles.sum())
-    return view(
+    written = view(
         robot,
         shown[0],
         out,
@@ -90,6 +95,7 @@ def _write(args: argparse.Namespace, out: str) -> File:
         names=names,
         title=args.title or names[0] if plan is None else args.title or f"Plan for {names[0]} on {name}",
     )
+    return written, note
 
 
 def _title(args: argparse.Namespace) -> str:

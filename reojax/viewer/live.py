@@ -14,7 +14,7 @@ from reojax._internal import checks
 from reojax.drawing.colours import AXES, INK, link_colour
 from reojax.drawing.solids import beam, joint_faces, link_faces, size
 from reojax.drawing.view import default_view
-from reojax.manoeuvres import manoeuvre_a, manoeuvre_b
+from reojax.manoeuvres import BY_NAME
 from reojax.mechanics.holonomy import net_rotation
 from reojax.mechanics.kinematics import centre_of_mass, link_poses
 from reojax.path import Path
@@ -186,7 +186,7 @@ class Live:
 
     def _loops(self, robot: Robot) -> dict[str, Path]:
         twist, bend = np.deg2rad(self.twist.value), np.deg2rad(self.bend.value)
-        return {"a": manoeuvre_a(twist, bend, layout_of(robot)), "b": manoeuvre_b(twist, bend, layout_of(robot))}
+        return {name: manoeuvre(twist, bend, layout_of(robot)) for name, manoeuvre in BY_NAME.items()}
 
     def run(self, manoeuvre: str) -> None:
         """Go through a manoeuvre, from wherever the joints are."""
