@@ -173,7 +173,7 @@ def test_merge_of_what_is_no_store(capsys, tmp_path):
 
 
 def test_pictures_of_one_two_and_more_axes():
-    """Lines, contours, and contours with the rest held; a design without a result is left out."""
+    """Lines, and contours for each value of a third axis with the rest held; a design without a result is left out."""
     axes = {"x": np.linspace(0, 1, 5), "y": np.linspace(1, 2, 4), "z": np.array([1.0, 2.0, 3.0]), "one": [7.0]}
     units = {"x": "rad", "z": "kg m^2", "product": "rad"}
 
@@ -182,11 +182,11 @@ def test_pictures_of_one_two_and_more_axes():
 
     found = reojax.sweep(function, axes, units=units, progress=False)
     figure = plot.sweep_figure(found, title="Title")
-    panel = figure.axes[0]
-    assert panel.get_title("left") == "product [deg]"
-    assert (panel.get_xlabel(), panel.get_ylabel()) == ("x [deg]", "y")
-    assert figure.get_suptitle() == "Title\nat z 2e+06 kg mm², one 7"
-    assert len(figure.axes) == 2
+    panels = figure.axes[:3]
+    titles = [f"product [deg]\nat z {z}e+06 kg mm²" for z in (1, 2, 3)]
+    assert [panel.get_title("left") for panel in panels] == titles
+    assert (panels[0].get_xlabel(), panels[0].get_ylabel()) == ("x [deg]", "y")
+    assert figure.get_suptitle() == "Title\nat one 7"
     with pytest.raises(ValueError, match="'vector' is no scalar result"):
         plot.sweep_figure(found, results=["vector"])
     line = reojax.sweep(lambda x: x * x, reojax.zipped(x=[1.0, 2.0, 4.0]), progress=False)
