@@ -41,7 +41,7 @@ def fill_gaps(capture: Capture) -> Float[np.ndarray, "m j"]:
     theta = np.array(capture.theta, float)
     for k, seen in enumerate(capture.seen_theta.T):
         if not seen.any():
-            raise ValueError(f"joint {k} was seen in no frame.")
+            raise ValueError(f"joint {k + 1} of {len(capture.seen_theta.T)} was seen in no frame.")
         gaps = np.clip(capture.time[~seen], capture.time[seen][0], capture.time[seen][-1])
         if seen.sum() > 1:
             theta[~seen, k] = PchipInterpolator(capture.time[seen], theta[seen, k])(gaps)

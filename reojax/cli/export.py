@@ -14,9 +14,6 @@ if TYPE_CHECKING:
     from reojax.path import Path
     from reojax.robot import Robot
 
-LARGEST = 1_000_000
-"""Largest number of points in a file."""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `reojax export`."""
@@ -48,22 +45,17 @@ def run(args: argparse.Namespace) -> None:
 
 def _write(robot: "Robot", path: "Path", args: argparse.Namespace) -> dict[str, Any]:
     import jax
-    import numpy as np
 
+    from reojax.files.points import sampled
     from reojax.files.trajectories import write_trajectory
     from reojax.mechanics.dynamics import inverse_dynamics
 
     trajectory = plan_motion(path, args)
-    duration = float(trajectory.duration)
-    steps = math.ceil(duration * args.rate - 1e-9)
-    if steps >= LARGEST:
-        raise ValueError(f"{duration:g} s at {args.rate:g} Hz are {steps} points; at most {LARGEST} are written.")
-    time = np.linspace(0, duration, max(steps, 1) + 1)
-    state = jax.vmap(trajectory.at)(time)
+    points = sampled(trajectory, args.rate)
     effort = None
     if args.torques:
-        effort = jax.jit(jax.vmap(inverse_dynamics, (None, 0, 0, 0)))(robot, *state)
-    write_trajectory(args.file, robot, time, *state, effort, delay=args.delay)
+        effort = jax.jit(jax.vmap(inverse_dynamics, (None, 0, 0, 0)))(robot, *points[1:])
+    write_trajectory(args.file, robot, *points, effort, delay=args.delay)
     return {
         "command": "export",
         "version": version(),
@@ -77,8 +69,8 @@ def _write(robot: "Robot", path: "Path", args: argparse.Namespace) -> dict[str, 
             "rate_hz": args.rate,
             "delay_s": args.delay,
         },
-        "points": len(time),
-        "duration_s": duration,
+        "points": len(points.time),
+        "duration_s": float(points.time[-1]),
         "joints": list(robot.joint_names),
         "joints_beyond_limits": joints_beyond_limits(robot, [path]),
         "file": args.file,

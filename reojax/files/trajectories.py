@@ -11,6 +11,8 @@ from reojax._internal.arrays import as_numbers
 from reojax._internal.checks import shorten
 from reojax._internal.files import check_ending, replacing
 from reojax.captures.columns import read_header, split
+from reojax.files.points import Movement, points_of
+from reojax.motion.time_laws import Law
 from reojax.robot import Robot
 
 FORMATS = ("csv", "yaml", "yml", "json")
@@ -31,12 +33,15 @@ def check_trajectory(path: str | os.PathLike[str]) -> Path:
 def write_trajectory(
     path: str | os.PathLike[str],
     robot: Robot,
-    time: ArrayLike,
-    theta: ArrayLike,
-    theta_dot: ArrayLike,
-    theta_ddot: ArrayLike,
+    time: ArrayLike | Movement,
+    theta: ArrayLike | None = None,
+    theta_dot: ArrayLike | None = None,
+    theta_ddot: ArrayLike | None = None,
     effort: ArrayLike | None = None,
     *,
+    durations: ArrayLike | None = None,
+    law: Law | str = "quintic",
+    rate: float = 200.0,
     delay: float = 0.0,
 ) -> None:
     """Write a joint trajectory to `path`, in the format that its ending says.
@@ -49,21 +54,37 @@ def write_trajectory(
     Args:
         path: the file; it changes only when everything has been written.
         robot: its joint names are written.
-        time: (m,) [s], strictly increasing, m >= 2; the first point is at time zero.
+        time: (m,) [s], strictly increasing, m >= 2, the first point at time zero; or instead of the four arrays a
+            `Motion`, a `Trajectory`, or a `Path`, `Plan`, `FreePaths` or `SavedPlan` with `durations`.
         theta: (m, j) joint angles [rad].
         theta_dot: (m, j) joint rates [rad/s].
         theta_ddot: (m, j) joint accelerations [rad/s^2].
         effort: (m, j) joint torques [N m].
+        durations: of a path or plan, seconds of each edge, or one number for every edge.
+        law: of a path or plan, the time law of every edge, or its name.
+        rate: of anything but arrays and a motion, which has its own times, points per second, about [Hz].
         delay: time from the start to the first point [s].
 
     Raises:
         ValueError: for wrong shapes, numbers that are not finite, times that do not increase by a nanosecond or more,
-            a start or end in motion (ROS 2), a negative delay, joint names that could not be read back from a .csv,
-            or a path that cannot be written.
+            a start or end in motion (ROS 2), missing arrays or durations, plans of many targets, a negative delay,
+            joint names that could not be read back from a .csv, or a path that cannot be written.
     """
     check_trajectory(path)
-    columns = {"positions": theta, "velocities": theta_dot, "accelerations": theta_ddot}
+    if isinstance(time, Movement):
+        if any(array is not None for array in (theta, theta_dot, theta_ddot)):
+            raise ValueError(f"angles, rates or accelerations are given; a {type(time).__name__} has its own.")
+        time, theta, theta_dot, theta_ddot = points_of(time, durations=durations, law=law, rate=rate)
+    elif durations is not None:
+        raise ValueError("`durations` is given; only a path or a plan needs them, not arrays.")
     names = {"positions": "theta", "velocities": "theta_dot", "accelerations": "theta_ddot", "effort": "effort"}
+    columns: dict[str, ArrayLike] = {}
+    for key, array in (("positions", theta), ("velocities", theta_dot), ("accelerations", theta_ddot)):
+        if array is None:
+            raise ValueError(
+                f"`{names[key]}` is missing: `time` is a {type(time).__name__}, no motion, trajectory, path or plan."
+            )
+        columns[key] = array
     if effort is not None:
         columns["effort"] = effort
     when = _numbers("time", time)
@@ -83,7 +104,7 @@ def write_trajectory(
     if Path(path).suffix.lower() == ".csv":
         text = _csv(robot, nanoseconds * 1e-9, arrays)
     else:
-        _check_rest(arrays["velocities"])
+        _check_rest(robot, arrays["velocities"])
         text = _joint_trajectory(robot, nanoseconds, arrays)
     with replacing(path) as file:
         file.write(text.encode())
@@ -97,14 +118,15 @@ def _numbers(entry: str, value: ArrayLike) -> np.ndarray:
     return array
 
 
-def _check_rest(rates: np.ndarray) -> None:
+def _check_rest(robot: Robot, rates: np.ndarray) -> None:
     allowed = REST * np.abs(rates).max(initial=0)
     for end, row in (("start", rates[0]), ("end", rates[-1])):
         if (np.abs(row) > allowed).any():
             joint = int(np.abs(row).argmax())
             raise ValueError(
-                f"the trajectory does not {end} at rest: joint {joint} moves at {row[joint]:.4g} rad/s there; "
-                "a ROS 2 controller would jump. Write a .csv, or choose a motion that rests at both ends."
+                f"the trajectory does not {end} at rest: joint {shorten(robot.joint_names[joint])} moves at "
+                f"{row[joint]:.4g} rad/s there; a ROS 2 controller would jump. Write a .csv, or choose a motion that "
+                "rests at both ends."
             )
 
 

@@ -69,10 +69,18 @@ class SavedPlan(NamedTuple):
     @property
     def path(self) -> Path:
         """The joint path of all runs."""
-        onward = np.tile(self.waypoints[1:], (self.repeats, 1))
-        if self.repeats * len(self.waypoints) > _MOST_CORNERS:
-            raise ValueError(f"{self.repeats} runs of {len(self.waypoints)} corners are too many for one path.")
-        return polygon(np.concatenate([self.waypoints[:1], onward]))
+        return repeated(self.waypoints, self.repeats)
+
+
+def repeated(waypoints: Float[np.ndarray, "v j"], repeats: int) -> Path:
+    """The joint path of `repeats` runs of a closed polygon.
+
+    Raises:
+        ValueError: if that would have too many corners.
+    """
+    if repeats * len(waypoints) > _MOST_CORNERS:
+        raise ValueError(f"{repeats} runs of {len(waypoints)} corners are too many for one path.")
+    return polygon(np.concatenate([waypoints[:1], np.tile(waypoints[1:], (repeats, 1))]))
 
 
 def save_plan(

@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from reojax import read_capture, robots
+from reojax import along, manoeuvre_a, net_rotation, polygon, read_capture, robots, simulate
 from reojax.cli import main
 from reojax.files.trajectories import check_trajectory, write_trajectory
+from reojax.planning.free_path import FreePaths
+from reojax.planning.plan_file import load_plan, save_plan
+from reojax.planning.result import Plan
 
 ROBOT = robots.prototype().replace(joint_names=("twist1", "bend, centre", "twist2"))
 TIME = np.linspace(0.5, 1.5, 21)
@@ -21,6 +24,11 @@ THETA = GOAL * (10 * _U**3 - 15 * _U**4 + 6 * _U**5)
 RATE = GOAL * (30 * _U**2 - 60 * _U**3 + 30 * _U**4)
 ACCELERATION = GOAL * (60 * _U - 180 * _U**2 + 120 * _U**3)
 MOTION = (TIME, THETA, RATE, ACCELERATION)
+PATH = manoeuvre_a(1.0, 0.5)
+TURN = np.asarray(net_rotation(robots.prototype(), PATH))
+PLAN = FreePaths(PATH.waypoints, TURN @ TURN, 0.0, 10.0, 2, True, "converged", None)
+MANY = FreePaths(PATH.waypoints[None].repeat(2, 0), np.eye(3), np.zeros(2), 1.0, 1, True, "converged", None)
+NO_ARRAYS = {"theta": None, "theta_dot": None, "theta_ddot": None}
 
 
 def test_csv_has_units_and_all_digits(tmp_path):
@@ -53,6 +61,41 @@ def test_joint_trajectory(tmp_path, ending):
     assert all(0 <= stamp["nanosec"] < 10**9 and isinstance(stamp["sec"], int) for stamp in stamps)
     write_trajectory(file, ROBOT, *MOTION, RATE)
     np.testing.assert_array_equal([point["effort"] for point in json.loads(file.read_text())["points"]], RATE)
+
+
+def _rows(file):
+    return np.genfromtxt(file, delimiter=",", skip_header=1)
+
+
+def test_whatever_moves_the_joints_is_written(tmp_path):
+    """A path with durations, its trajectory and its motion are the same; a plan is its path, all runs of it."""
+    file, robot, durations = tmp_path / "t.csv", robots.prototype(), [0.1, 0.2, 0.1, 0.2]
+    trajectory = along(PATH, "trapezoid", durations)
+    write_trajectory(file, robot, PATH, durations=durations, law="trapezoid", rate=100)
+    by_path = _rows(file)
+    assert by_path.shape == (61, 10)
+    np.testing.assert_allclose(by_path[:, 0], np.linspace(0, 0.6, 61), atol=1e-9)
+    for row in by_path[[3, 17, 44]]:
+        np.testing.assert_allclose(row[1:], np.ravel(trajectory.at(row[0])), atol=1e-9)
+    write_trajectory(file, robot, trajectory, rate=100)
+    np.testing.assert_array_equal(_rows(file), by_path)
+    motion = simulate(robot, PATH, durations=durations, samples=8)
+    write_trajectory(file, robot, motion, effort=motion.torque)
+    expected = np.concatenate([np.asarray(motion.time)[:, None], *motion[1:4], motion.torque], axis=1)
+    np.testing.assert_allclose(_rows(file), expected, rtol=1e-9, atol=1e-9)
+
+    write_trajectory(file, robot, polygon(np.concatenate([PATH.waypoints, PATH.waypoints[1:]])), durations=0.1)
+    twice = _rows(file)
+    assert twice[-1, 0] == 0.8
+    write_trajectory(file, robot, PLAN, durations=0.1)
+    np.testing.assert_array_equal(_rows(file), twice)
+    save_plan(PLAN, tmp_path / "p.json", robot=robot)
+    write_trajectory(file, robot, load_plan(tmp_path / "p.json"), durations=0.1)
+    np.testing.assert_array_equal(_rows(file), twice)
+    empty = np.zeros(1)
+    plan = Plan(("A",), empty, empty, empty, PATH.waypoints, np.eye(3), 0.0, 1.0, 1, True, "converged", None)
+    write_trajectory(file, robot, plan, durations=0.1)
+    np.testing.assert_allclose(_rows(file)[:, 1:], twice[:81, 1:], atol=1e-10)
 
 
 AWKWARD = ["theta1", "theta2", "theta3", "zxz1", "zxz2", "zxz3", "qw", "qx", "time", "t", "rate theta1", "a_rad", "a"]
@@ -110,7 +153,9 @@ def test_only_rest_to_rest_goes_to_a_controller(tmp_path):
     """The whole file is refused, and the one that was there stays."""
     file = tmp_path / "t.yaml"
     file.write_text("old")
-    with pytest.raises(ValueError, match="the trajectory does not end at rest: joint 1 moves at -3.* rad/s"):
+    with pytest.raises(
+        ValueError, match="the trajectory does not end at rest: joint 'bend, centre' moves at -3.* rad/s"
+    ):
         write_trajectory(file, ROBOT, *(column[:12] for column in MOTION))
     with pytest.raises(ValueError, match="the trajectory does not start at rest"):
         write_trajectory(file, ROBOT, *(column[10:] for column in MOTION))
@@ -130,6 +175,15 @@ def test_only_rest_to_rest_goes_to_a_controller(tmp_path):
         ({"theta_ddot": ACCELERATION * np.nan}, r"theta_ddot\[0, 0\] is not finite"),
         ({"effort": "much"}, "`effort` is 'much'"),
         ({"delay": -1.0}, "`delay` is -1.0"),
+        ({"theta": None}, "`theta` is missing: `time` is a ndarray, no motion"),
+        ({"durations": 1.0}, "`durations` is given; only a path or a plan"),
+        ({"time": PATH}, "angles, rates or accelerations are given; a Path has its own"),
+        ({"time": PATH} | NO_ARRAYS, "`durations` is missing: a Path has no time"),
+        ({"time": PATH, "durations": [0.1, 0.2]} | NO_ARRAYS, r"`durations` has shape \(2,\)"),
+        ({"time": PATH, "durations": 0.1, "rate": 1e9} | NO_ARRAYS, "0.4 s at 1e.09 Hz are 400000000 points"),
+        ({"time": PATH, "durations": 0.1, "rate": 0} | NO_ARRAYS, "`rate` is 0; it must be one positive number, in Hz"),
+        ({"time": along(PATH, "quintic", 0.1), "durations": 0.1} | NO_ARRAYS, "a Trajectory has its own"),
+        ({"time": MANY, "durations": 0.1} | NO_ARRAYS, "these are 2 plans; choose one"),
         ({"path": "t.bag"}, "the name of a trajectory ends in one of .csv, .yaml, .yml, .json"),
         ({"path": "nowhere/t.csv"}, "there is no folder"),
     ],
