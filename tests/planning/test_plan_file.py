@@ -66,7 +66,7 @@ def test_commands_run_a_plan(file, capsys, monkeypatch, tmp_path):
     report = json.loads(capsys.readouterr().out)
     np.testing.assert_allclose(report["rotation_matrix"], ONE @ ONE @ ONE, atol=1e-10)
     table = tmp_path / "trajectory.csv"
-    assert main(["export", str(table), "--plan", file, "--duration", "0.5", "--rate", "10"]) == 0
+    assert main(["export", str(table), "--plan", file, "--duration", "6", "--rate", "10"]) == 0
     rows = np.genfromtxt(table, delimiter=",", names=True)
     assert len(rows) == 61
 
