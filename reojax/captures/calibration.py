@@ -1,4 +1,4 @@
-"""Fit a robot's numbers to a capture: joint angles in, orientation of the base compared, by Gauss-Newton steps.
+"""Fit a robot's numbers to a capture: joint angles in, orientation of the base compared, by least squares.
 
 The measured joint angles, joined by straight edges, give the orientation by the momentum equation. Its distance from
 the measured one, frame by frame, is the residual
@@ -16,7 +16,7 @@ pushes all later orientations the same way. The covariance has both.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import jax
@@ -24,6 +24,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from reojax import so3
 from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.captures.capture import Capture
@@ -93,7 +94,7 @@ def calibrate(
             `Parameter`s of your own. Scaling all masses and inertias together changes nothing that can be measured.
         clock: fit a shift between the clocks of joints and cameras too. The frame of the cameras is always fitted.
         joint_noise: standard deviation of the joint angles' noise [rad]; default from their fourth differences.
-        max_steps: most Levenberg-Marquardt steps.
+        max_steps: most evaluations of SciPy's `least_squares`.
 
     Raises:
         ValueError: if the capture lacks joints or orientation, or does not fit the robot, or for an unknown parameter.
@@ -111,22 +112,9 @@ def calibrate(
         )
 
     start = np.array([p.start for p in fitted])
-    state = problem.fit_window(start)
-    before, damping, converged, step = state.rms, 1e-6, False, 0
-    for step in range(1, max_steps + 1):  # noqa: B007
-        tried = problem.move(state, damping)
-        if tried.cost <= state.cost * (1 + 1e-12):
-            change = np.abs((tried.x - state.x) / problem.scale).max(initial=0)
-            gain = state.cost - tried.cost
-            state, damping = tried, max(damping / 10, 1e-12)
-            converged = change < 1e-6 or gain < 1e-10 * state.cost
-            if converged:
-                break
-        else:
-            damping *= 10
-            if damping > 1e6:
-                break
-    return problem.report(state, noise, before, bool(converged), step, start)
+    begun = problem.fit_window(start)
+    state, converged, steps = problem.fit(begun, max_steps)
+    return problem.report(state, noise, begun.rms, converged, steps, start)
 
 
 class _State(NamedTuple):
@@ -172,34 +160,47 @@ class _Problem:
         """The state at the parameters `x`, frame and shift at their best."""
         turned, _ = self._orientation(x)
         state = self._state(x, align_frames(self.measured, turned[self.seen]), 0.0)
-        for _ in range(10 if self.clock else 3):
-            state = self._state(x, *self._nuisance(state, self._step(state, 1e-12, fixed=True)))
-        return state
+        return self.fit(state, 20, fixed=True)[0]
 
-    def move(self, state: _State, damping: float) -> _State:
-        """The state after a damped step from `state`."""
-        step = self._step(state, damping)
-        x = state.x + step[: len(state.x)] * self.scale
-        positive = np.array([p.positive for p in self.fitted])
-        x = np.where(positive, np.clip(x, 0.3 * state.x, 3 * state.x), x)
-        return self._state(x, *self._nuisance(state, step))
+    def fit(self, begun: _State, most: int, fixed: bool = False) -> tuple[_State, bool, int]:
+        """The state of least squares from `begun` on, whether it converged, and the evaluations that it took.
 
-    def _step(self, state: _State, damping: float, fixed: bool = False) -> np.ndarray:
-        jacobian = state.derivative.reshape(-1, state.derivative.shape[-1]).copy()
-        if fixed:
-            jacobian[:, : len(state.x)] = 0
-        lengths = np.linalg.norm(jacobian, axis=0)
-        columns = jacobian / np.where(lengths > 0, lengths, 1)
-        normal = columns.T @ columns + damping * np.eye(len(lengths))
-        return -np.linalg.solve(normal, columns.T @ state.residual.ravel()) / np.where(lengths > 0, lengths, 1)
-
-    def _nuisance(self, state: _State, step: np.ndarray) -> tuple[np.ndarray, float]:
+        The unknowns are the parameters by their scales (none if `fixed`), a rotation vector from the frame of `begun`,
+        and the shift. The trust region of SciPy's method takes columns of the derivatives at length one.
+        """
+        from scipy.optimize import least_squares
         from scipy.spatial.transform import Rotation
 
-        rest = step[len(state.x) :]
-        most = 0.25 * float(np.ptp(self.time))
-        offset = float(np.clip(state.offset + rest[3], -most, most)) if self.clock else 0.0
-        return Rotation.from_rotvec(rest[:3]).as_matrix() @ state.frame, offset
+        p = 0 if fixed else len(begun.x)
+
+        @lru_cache(maxsize=2)  # residuals and derivatives are asked for at the same place
+        def state_of(unknowns: tuple[float, ...]) -> _State:
+            x = begun.x if fixed else np.array(unknowns[:p]) * self.scale
+            frame = Rotation.from_rotvec(unknowns[p : p + 3]).as_matrix() @ begun.frame
+            return self._state(x, frame, unknowns[p + 3] if self.clock else 0.0)
+
+        def state_at(unknowns: np.ndarray) -> _State:
+            return state_of(tuple(unknowns.tolist()))
+
+        def residual(unknowns: np.ndarray) -> np.ndarray:
+            return state_at(unknowns).residual.ravel()
+
+        def jacobian(unknowns: np.ndarray) -> np.ndarray:
+            columns = state_at(unknowns).derivative.copy()
+            parts = len(begun.x)
+            turn = np.asarray(so3.left_jacobian(unknowns[p : p + 3]))  # of the frame, by its rotation vector
+            columns[..., parts : parts + 3] = columns[..., parts : parts + 3] @ turn
+            return columns[..., parts - p :].reshape(-1, columns.shape[-1] - parts + p)
+
+        most_shift = 0.25 * float(np.ptp(self.time))
+        lower = [0.0 if parameter.positive else -np.inf for parameter in self.fitted[:p]] + [-np.inf] * 3
+        upper = [np.inf] * (p + 3)
+        first = np.concatenate([begun.x[:p] / self.scale[:p], np.zeros(3)])
+        if self.clock:
+            lower, upper, first = [*lower, -most_shift], [*upper, most_shift], np.append(first, begun.offset)
+        rules: dict[str, Any] = {"x_scale": "jac", "ftol": 1e-10, "xtol": 1e-10, "gtol": None, "max_nfev": most}
+        found = least_squares(residual, first, jacobian, (lower, upper), **rules)
+        return state_at(found.x), bool(found.status > 0), int(found.nfev)
 
     def _orientation(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Orientation at every frame, and the effect of parameters and ends of each edge on all later ones."""
