@@ -199,7 +199,8 @@ class _Problem:
         if self.clock:
             lower, upper, first = [*lower, -most_shift], [*upper, most_shift], np.append(first, begun.offset)
         rules: dict[str, Any] = {"x_scale": "jac", "ftol": 1e-10, "xtol": 1e-10, "gtol": None, "max_nfev": most}
-        found = least_squares(residual, first, jacobian, (lower, upper), **rules)
+        # SciPy's types have no function for the derivatives
+        found = least_squares(residual, first, jacobian, (lower, upper), **rules)  # pyright: ignore[reportArgumentType]
         return state_at(found.x), bool(found.status > 0), int(found.nfev)
 
     def _orientation(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
