@@ -1,4 +1,9 @@
-"""The command `reojax`, and `python -m reojax`: it ends in order, from the first import on, also by Ctrl-C."""
+"""The command `reojax`, and `python -m reojax`: it ends in order, from the first import on, also by Ctrl-C.
+
+A Ctrl-C ends the process at once, with one line and status 130. Raised as an exception instead, it would go through
+code of Python that JAX's compiler has called, which can end in a segmentation fault, and be swallowed where objects are
+cleared up. Files are written under names of their own first, so that ending anywhere leaves nothing half done.
+"""
 
 import os
 import signal
@@ -8,52 +13,28 @@ from typing import Any, NoReturn
 
 def main() -> NoReturn:
     """Run the command line, and end the process with its status."""
-    interrupted = False
+    signal.signal(signal.SIGINT, _end)
+    from reojax.cli import main as run
 
-    def interrupt(*_: Any) -> NoReturn:
-        nonlocal interrupted
-        interrupted = True
-        raise KeyboardInterrupt
-
-    def swallowed(event: Any) -> None:
-        """Python drops what is raised while an object is cleared up; a Ctrl-C comes back a moment later."""
-        if event.exc_type is KeyboardInterrupt:
-            signal.setitimer(signal.ITIMER_REAL, 0.01)
-        else:
-            sys.__unraisablehook__(event)
-
-    def told(kind: Any, *rest: Any) -> None:
-        """Modules in C print what stops their import, a Ctrl-C too, before they raise."""
-        if not interrupted:
-            sys.__excepthook__(kind, *rest)
-
-    sys.excepthook = told
-    if hasattr(signal, "setitimer"):
-        signal.signal(signal.SIGALRM, interrupt)
-        sys.unraisablehook = swallowed
-    signal.signal(signal.SIGINT, interrupt)
-    status = 130
-    try:
-        from reojax.cli import main as run
-
-        status = run()
-    except BaseException:  # an import that is interrupted may raise anything
-        if not interrupted:
-            raise
-        _tell("reojax: interrupted\n")
+    status = run()
     if status == 130:  # threads of XLA may be computing, which must not outlive Python: end them with the process
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         os._exit(130)
     sys.exit(status)
 
 
-def _tell(text: str) -> None:
-    if sys.stderr is not None:
-        try:
-            sys.stderr.write(text)
-            sys.stderr.flush()
-        except OSError:
-            pass
+def _end(*_: Any) -> NoReturn:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    work = sys.modules.get("reojax._internal.interruption")
+    try:
+        for file in [*getattr(work, "unfinished", ())]:
+            file.unlink(missing_ok=True)
+        line = "; ".join(["reojax: interrupted", *getattr(work, "notes", ())])
+        below = "\n" if os.isatty(2) else ""  # a bar may stand there
+        os.write(2, f"{below}{line}\n".encode())
+    except OSError:
+        pass
+    os._exit(130)
 
 
 if __name__ == "__main__":

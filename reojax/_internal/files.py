@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from reojax._internal.interruption import unfinished
+
 
 def check_writable(path: str | os.PathLike[str]) -> Path:
     """Return `path` if a file can be written there now; for asking before a long computation.
@@ -49,6 +51,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     with _clearly("write", path):
         mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else None
         temporary, file = _beside(target, mode)
+        unfinished.add(temporary)
         try:
             with file:
                 yield file
@@ -57,6 +60,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             os.replace(temporary, target)
         finally:
             temporary.unlink(missing_ok=True)
+            unfinished.discard(temporary)
 
 
 def write_json(path: str | os.PathLike[str], data: Any) -> None:

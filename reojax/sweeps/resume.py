@@ -10,6 +10,7 @@ import numpy as np
 from jax.sharding import Mesh
 
 from reojax._internal.checks import shorten
+from reojax._internal.interruption import noting
 from reojax.sweeps.chunks import compile_chunk
 from reojax.sweeps.engine import run
 from reojax.sweeps.outputs import Outputs
@@ -45,16 +46,13 @@ def complete(
                 else:
                     yield number
 
-        try:
+        where = shorten(str(store.folder))
+        with noting(f"finished chunks are in {where}, and the same sweep goes on from there"):
             if missing:
                 for chunk in run(function, compile_chunk(function, store.designs, store.sizes, mesh), outputs, todo()):
                     store.put(chunk)
                     found[chunk.number] = chunk.bad
                     shown.add(chunk.number)
-        except KeyboardInterrupt as interrupt:
-            where = str(store.folder)
-            interrupt.add_note(f"finished chunks are in {shorten(where)}, and the same sweep goes on from there")
-            raise
     if several:
         from jax.experimental import multihost_utils
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._internal.checks import shorten
+from reojax._internal.interruption import noting
 from reojax.sweeps.chunks import chunking, compile_chunk
 from reojax.sweeps.devices import Devices, at_most, mesh_of
 from reojax.sweeps.engine import run
@@ -106,14 +107,10 @@ def run_sweep(
     if store is None:
         memory = Memory(outputs.arrays, sizes, "give a `store`")
         program = compile_chunk(function, designs, sizes, mesh)
-        try:
-            with Progress(sizes, mine, show=progress) as shown:
-                for chunk in run(function, program, outputs, mine):
-                    memory.put(chunk)
-                    shown.add(chunk.number)
-        except KeyboardInterrupt as interrupt:
-            interrupt.add_note("without a store nothing is kept")
-            raise
+        with noting("without a store nothing is kept"), Progress(sizes, mine, show=progress) as shown:
+            for chunk in run(function, program, outputs, mine):
+                memory.put(chunk)
+                shown.add(chunk.number)
         failures, load = memory.failures, lambda: memory.arrays(designs)
     else:
         kept = create(store, identity(function, designs, outputs, sizes, platform), designs, labels)

@@ -53,6 +53,7 @@ def test_without_noise_the_true_numbers_come_out(synthetic, exact):
     assert again.angle_rms < 2e-3
 
 
+@pytest.mark.slow
 def test_the_truth_lies_within_the_stated_uncertainty(synthetic):
     """Over seeds: standard scores of all three numbers are about normal, and the noise is found."""
     scores, noise = [], []

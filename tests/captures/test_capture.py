@@ -309,6 +309,7 @@ def test_bad_input_is_one_line_and_status_2(capsys, monkeypatch, tmp_path, argum
     assert os.listdir(tmp_path) == []
 
 
+@pytest.mark.slow
 def test_a_planned_manoeuvre_is_compared_too(capsys, monkeypatch):
     """The shipped capture against the plan it was made with: the start is found, the joints are their noise off."""
     monkeypatch.setenv("REOJAX_CACHE", "0")

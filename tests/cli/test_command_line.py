@@ -29,6 +29,7 @@ def _no_cache(monkeypatch):
     monkeypatch.setenv("REOJAX_CACHE", "0")
 
 
+@pytest.mark.slow
 def test_simulate_prints_what_the_library_computes(capsys, tmp_path):
     """The default is manoeuvre A on the prototype at 270/120; every form of the rotation is the same one."""
     out = tmp_path / "a.png"
@@ -58,6 +59,7 @@ def test_simulate_prints_what_the_library_computes(capsys, tmp_path):
     assert out.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_python_m_reojax_prints_a_table_and_keeps_its_program(tmp_path):
     """In a process of its own: text on stdout, nothing on stderr, the compiled program in the cache."""
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "JAX_COMPILATION_CACHE_DIR": ""}
@@ -332,6 +334,7 @@ def _started(monkeypatch, folder, cache, given) -> dict:
     return told
 
 
+@pytest.mark.slow
 def test_a_damaged_entry_of_the_cache_is_made_anew(tmp_path):
     """Without a word, and the next run finds it whole."""
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "JAX_COMPILATION_CACHE_DIR": "", "REOJAX_CACHE": "1"}

@@ -19,6 +19,7 @@ def test_samples_are_the_clearances_of_postures():
     np.testing.assert_allclose(found[1, 2], middle, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_shortfall_is_on_the_safe_side_of_the_least_sample():
     """Rounded off by a tenth of a radius at most, never above the least; more of it with what lies between."""
     short = clearance_shortfall(PROTOTYPE, WAYPOINTS, 0.005, samples=32)

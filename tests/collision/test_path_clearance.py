@@ -155,6 +155,7 @@ def test_many_paths_at_once():
         assert batch.pair[i] == single.pair
 
 
+@pytest.mark.slow
 def test_derivative_is_that_of_the_closest_place():
     """By the waypoints, against differences."""
     waypoints = paths(PROTOTYPE, 1, 3, 2.0, seed=4)[0]

@@ -204,6 +204,7 @@ ROLL = Problem(
 )
 
 
+@pytest.mark.slow
 def test_a_design_with_a_catalogue():
     """The ratio is one that can be bought, and no other one of the catalogue gives a cheaper design."""
     found = ROLL.solve(8, seed=3)
@@ -220,6 +221,7 @@ def test_a_design_with_a_catalogue():
     np.testing.assert_allclose(found.cost[found.best], min(costs), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_many_problems_side_by_side_are_those_solved_alone():
     """A trade-off over the gear ratio, the twist held in one problem and free in the others."""
     gears, twist = np.array([4.0, 9.0, 24.0]), np.array([np.nan, np.deg2rad(200), np.nan])
@@ -236,6 +238,7 @@ def test_many_problems_side_by_side_are_those_solved_alone():
     np.testing.assert_allclose(picked.value[:, 2], gears, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_held_variables_have_no_influence():
     """A target 0.283 degrees away is reached whether it is a matrix or the value of a variable with wide bounds."""
     near = PROTOTYPE.replace(lower=np.full(3, -np.deg2rad(20)), upper=np.full(3, np.deg2rad(20)))

@@ -66,6 +66,7 @@ def test_frame_at_the_end():
 TOLERANCES = {"mass": 0.01, "inertia": [0.02, 0.0, 0.03], "com": 1e-3, "axis": 2e-3, "gear_ratio": 0.01}
 
 
+@pytest.mark.slow
 def test_linear_rule_and_monte_carlo_agree():
     found = design.spread(ROBOT, PATH, TOLERANCES, samples=4000, seed=1)
     assert len(found.source) == 3 + 3 + 9 + 4 + 2

@@ -154,6 +154,7 @@ def test_by_the_amplitudes(weight, amplitudes):
     assert (np.abs(forward).max() > 1e-2) == any(amplitudes)
 
 
+@pytest.mark.slow
 def test_reverse_is_the_transpose_of_forward_in_a_long_robot():
     """By every number at once, where what the links hand on is kept one by one."""
     robot = random_robot(4, 5, branched=True, limits=LIMITS)

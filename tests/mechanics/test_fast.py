@@ -89,6 +89,7 @@ def test_products_are_in_order(count):
     np.testing.assert_allclose(jax.vmap(to_matrix)(products_up_to(factors)), np.array(expected), atol=1e-14)
 
 
+@pytest.mark.slow
 def test_loops_over_joints_are_the_code_for_every_joint(monkeypatch):
     """Value, reverse and forward mode by every array and by the path, alone and in a batch."""
 

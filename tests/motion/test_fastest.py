@@ -36,12 +36,14 @@ def check(found, target):
     np.testing.assert_allclose(motion.time[-1], found.duration)
 
 
+@pytest.mark.slow
 def test_overlapped_edges_are_faster_and_turn_as_far():
     found = reojax.overlap(PROTOTYPE, A, RE_MAX_17)
     check(found, reojax.net_rotation(PROTOTYPE, A))
     assert found.duration < 0.85 * reojax.minimum_time(PROTOTYPE, A, RE_MAX_17).duration
 
 
+@pytest.mark.slow
 def test_the_fastest_loop_with_a_rotation_of_its_own():
     """A half turn, which the path it starts from is not, in less time, joints up to their limits."""
     target = so3.exp([0.0, 0.0, np.pi])

@@ -186,6 +186,7 @@ def test_the_motor_s_curve():
     assert asked.margin[0] == pytest.approx(line)
 
 
+@pytest.mark.slow
 def test_float32_vmap_and_gradients():
     """dtype follows the inputs; durations differentiate."""
     single = jax.tree.map(np.float32, PROTOTYPE)

@@ -19,6 +19,7 @@ def sampled(robot, waypoints):
     return np.asarray(jax.jit(clearances)(robot, postures)).min()
 
 
+@pytest.mark.slow
 def test_free_path_keeps_its_clearance():
     """Pitch by 90 degrees, for which the shortest paths strike: 5 mm proven, the target met, no sample below."""
     found = reojax.free_path(PROTOTYPE, PITCH, clearance=0.005, starts=4, corners=6)

@@ -41,6 +41,7 @@ def found() -> FreePaths:
     return free_paths(ROBOT, TARGETS, **LIMITS, **FEW)
 
 
+@pytest.mark.slow
 def test_targets_are_reached_inside_the_box(found):
     assert found.converged.all()
     assert (found.error <= 1e-9).all()
@@ -128,6 +129,7 @@ CHAIN = chain(4)
 TENTH = Rotation.from_rotvec([0.05, -0.07, 0.05]).as_matrix()
 
 
+@pytest.mark.slow
 def test_any_robot_from_any_posture_to_another():
     """No layout; every corner within limits; both ends where they should be."""
     start, end = np.array([0.5, -1.0, 0.2, 1.5]), np.array([0.4, -0.8, 0.1, 1.2])
@@ -141,6 +143,7 @@ def test_any_robot_from_any_posture_to_another():
     assert apart(np.asarray(turn), TENTH) < 1.5e-9
 
 
+@pytest.mark.slow
 def test_joints_by_name_and_narrower_limits():
     """The others stay where they are, and the limits given hold beside the robot's own."""
     start = np.array([0.1, 0.2, 0.3, -1.4])
@@ -153,6 +156,7 @@ def test_joints_by_name_and_narrower_limits():
     assert found.waypoints[:, 2].max() <= 0.8
 
 
+@pytest.mark.slow
 def test_coupled_joints_follow_exactly():
     """In the path, its travel and its limits: the driver may go to 0.5 rad only, where its follower is at 1.5."""
     robot = chain(5, couplings={"joint4": ("joint1", -2.0, 0.5)})
@@ -182,6 +186,7 @@ def test_one_loop_many_times():
     assert twice.converged
 
 
+@pytest.mark.slow
 def test_what_is_unreachable_in_principle_is_told():
     out_of_plane = Rotation.from_rotvec([0.5, 0, 0.3]).as_matrix()
     planar = chain(3, [[0, 0, 1]] * 3)

@@ -87,6 +87,7 @@ def test_identity_half_turns_and_small_turns():
     assert alone.travel == alone.error == 0
 
 
+@pytest.mark.slow
 def test_other_robots():
     """Unequal ends and a centre of mass out of the bending plane; six links that fold their feet."""
     targets = Rotation.random(4, random_state=2).as_matrix()
@@ -140,7 +141,7 @@ def test_derivatives_of_a_word(count):
     """Against differences, powers of loops too."""
     from reojax.planning.plan import _scene
 
-    here = _scene(ROBOT, reojax.FOUR_BODY, "AB", *LIMITS.values())
+    here = _scene(ROBOT, reojax.FOUR_BODY, "AB", *LIMITS.values(), None)
     rng = np.random.default_rng(3)
     letter = np.array([[0], [1], [0], [-1]])
     low, high = (np.moveaxis(edge[np.maximum(letter, 0)], -1, 0) for edge in here.box[1:])

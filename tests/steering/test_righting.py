@@ -64,6 +64,7 @@ def test_conservation_by_muj_co():
     assert so3.angle(jnp.asarray(rotation).T @ TARGETS[0]) < 1e-3
 
 
+@pytest.mark.slow
 def test_too_short_for_the_motors():
     """Not converged, with the least duration found; which then does."""
     found = righting(ROBOT, TARGETS[1], momentum=MOMENTA[1], duration=0.12, motors=RE_MAX_17, starts=2, pieces=5)
