@@ -9,7 +9,7 @@ import numpy as np
 
 import reojax
 from reojax import plot, robots
-from reojax.captures.comparison import interpolate
+from reojax.captures.alignment import interpolate
 from reojax.mechanics.attitude import tilt_and_roll, zxz_beside, zxz_without_jumps
 from reojax.motion.pid import FEEDFORWARD_BANDWIDTH, PID_BANDWIDTH, Tracking, gains, track
 from reojax.motion.release import released

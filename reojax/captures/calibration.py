@@ -27,8 +27,8 @@ from jaxtyping import Float
 from reojax import so3
 from reojax._internal import checks
 from reojax._internal.arrays import Array
+from reojax.captures.alignment import align_frames, interpolate
 from reojax.captures.capture import Capture
-from reojax.captures.comparison import align_frames, interpolate
 from reojax.captures.orientation import chain, edge_turn, fill_gaps, fill_up, steps_needed
 from reojax.captures.parameters import Parameter, Put, resolve
 from reojax.robot import Robot

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import reojax
 from reojax import plot, robots
-from reojax.captures import comparison, orientation
+from reojax.captures import alignment, comparison, orientation
 from reojax.cli import main
 from reojax.mechanics.attitude import tilt_and_roll, zxz_beside, zxz_without_jumps
 from reojax.robots.random import random_robot
@@ -195,7 +195,7 @@ def test_time_is_aligned_below_a_frame(with_joints):
     rng = np.random.default_rng(2)
     when = np.sort(rng.choice(np.arange(-0.1, 0.9, 1 / 200), 160, replace=False))
     late = 5.012345
-    at = comparison.interpolate(MOTION.time, MOTION.rotation)(when)
+    at = alignment.interpolate(MOTION.time, MOTION.rotation)(when)
     joints = np.stack([np.interp(when, MOTION.time, column) for column in MOTION.theta.T], axis=1)
     cameras = Rotation.from_rotvec([0.3, -2.0, 0.7]).as_matrix()
     capture = reojax.make_capture(when + late, joints if with_joints else None, cameras @ at)
