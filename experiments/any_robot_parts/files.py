@@ -19,16 +19,20 @@ _MOVES = re.compile(r"type=.(revolute|continuous|prismatic|spherical|floating|pl
 _BODIES = re.compile(r"<(body|include)\b")
 
 
+class Missing(ValueError):
+    """A package with robot files is not installed."""
+
+
 def robot_files(package: str) -> list[Path]:
     """Robot files of a package: URDFs with a joint that moves, MJCFs with a body.
 
     Raises:
-        ValueError: if the package is not installed.
+        Missing: if the package is not installed.
     """
     ending, kind, place = PACKAGES[package]
     folder = _folder(kind, place)
     if folder is None or not folder.is_dir():
-        raise ValueError(f'{package} is not installed: pip install "reojax[zoo]"')
+        raise Missing(f'{package} is not installed: pip install "reojax[zoo]"')
     return [file for file in sorted(folder.rglob(f"*.{ending}")) if _is_robot(file)]
 
 

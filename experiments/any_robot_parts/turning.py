@@ -12,6 +12,7 @@ from common.replay import pinocchio
 from scipy.spatial.transform import Rotation
 
 import reojax
+from any_robot_parts.files import Missing
 
 ROBOTS = {
     "SPART 7-joint arm": ("SPARTpy", "urdf/floating_7dof_manipulator.urdf"),
@@ -82,6 +83,6 @@ def _folder(package: str) -> Path:
         return Path(sys.prefix) / "share/iCub/robots"
     found = find_spec("numpy" if package == "example-robot-data" else package)
     if found is None or not found.submodule_search_locations:
-        raise ValueError(f'{package} is not installed: pip install "reojax[zoo]"')
+        raise Missing(f'{package} is not installed: pip install "reojax[zoo]"')
     here = Path(found.submodule_search_locations[0])
     return here.parent / "cmeel.prefix/share/example-robot-data/robots" if package == "example-robot-data" else here
