@@ -13,6 +13,7 @@ from reojax import robots
 pytest.importorskip("selenium", reason="no selenium: pip install reojax[test]")
 from selenium.webdriver.common.keys import Keys
 
+pytestmark = pytest.mark.slow  # a browser
 PROTOTYPE = robots.prototype()
 LOOP = reojax.manoeuvre_a(np.deg2rad(270.0), np.deg2rad(120.0))
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
