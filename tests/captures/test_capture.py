@@ -62,7 +62,7 @@ def test_headers_in_any_order_unit_and_delimiter(read, header, row):
 
 
 def test_quaternions_and_zxz_angles_are_the_same_orientation(read):
-    turns = Rotation.random(5, rng=1)
+    turns = Rotation.random(5, random_state=1)
     rows = [f"{k},{','.join(map(repr, q))}" for k, q in enumerate(turns.as_quat(scalar_first=True).tolist())]
     angles = turns.as_euler("ZXZ", degrees=True).tolist()
     euler = [f"{k},{','.join(map(repr, a))}" for k, a in enumerate(angles)]

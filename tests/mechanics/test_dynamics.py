@@ -37,7 +37,7 @@ def test_torques_are_those_of_pinocchio(joints, branched):
     robot, theta, rate, acceleration, _, found = moving(joints, branched)
     foreign = interop.pinocchio_model(robot)
     data = foreign.model.createData()
-    attitude = Rotation.random(rng=np.random.default_rng(joints))
+    attitude = Rotation.random(random_state=np.random.default_rng(joints))
     q = np.concatenate([[0.3, -1.0, 2.0], attitude.as_quat(), foreign.angles @ theta])
     v = foreign.drive @ np.concatenate([[0.4, 0.1, -0.2], found.omega, rate])
 

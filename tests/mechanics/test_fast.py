@@ -79,7 +79,7 @@ def test_a_step_is_the_exponential():
 
 @pytest.mark.parametrize("count", [1, 2, 7, 16])
 def test_products_are_in_order(count):
-    turns = Rotation.random(count, rng=np.random.default_rng(count))
+    turns = Rotation.random(count, random_state=np.random.default_rng(count))
     factors = tuple(jnp.asarray(turns.as_quat(scalar_first=True)).T)
     so_far, expected = np.eye(3), []
     for matrix in turns.as_matrix():

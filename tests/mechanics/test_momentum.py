@@ -51,7 +51,7 @@ def test_matrices_are_those_of(library, joints, branched):
     momentum = getattr(interop, f"{library}_momentum")
     rng = np.random.default_rng(joints)
     for robot, theta, A, B in evaluated(joints, branched):
-        rotation = Rotation.random(rng=rng).as_matrix()
+        rotation = Rotation.random(random_state=rng).as_matrix()
         exact = momentum(build(robot), theta, rng.normal(size=3), rotation)
         exact_A, exact_B, linear = interop.split(exact, rotation)
         assert relative(A, exact_A) < 1e-12

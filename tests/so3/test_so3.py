@@ -96,7 +96,7 @@ def test_angle_is_scipys():
 
 
 def test_interpolation_is_scipys():
-    start, end = Rotation.random(2, rng=np.random.default_rng(1))
+    start, end = Rotation.random(2, random_state=np.random.default_rng(1))
     parts = np.linspace(0, 1, 7)
     ours = [interpolate(start.as_matrix(), end.as_matrix(), part) for part in parts]
     slerp = Slerp([0, 1], Rotation.concatenate([start, end]))
