@@ -29,11 +29,20 @@ def robot_files(package: str) -> list[Path]:
     Raises:
         Missing: if the package is not installed.
     """
-    ending, kind, place = PACKAGES[package]
+    return [file for file in sorted(folder_of(package).rglob(f"*.{PACKAGES[package][0]}")) if _is_robot(file)]
+
+
+def folder_of(package: str) -> Path:
+    """Folder in which a package keeps its robot files.
+
+    Raises:
+        Missing: if the package is not installed.
+    """
+    _, kind, place = PACKAGES[package]
     folder = _folder(kind, place)
     if folder is None or not folder.is_dir():
         raise Missing(f'{package} is not installed: pip install "reojax[zoo]"')
-    return [file for file in sorted(folder.rglob(f"*.{ending}")) if _is_robot(file)]
+    return folder
 
 
 def _folder(kind: str, place: str) -> Path | None:

@@ -1,10 +1,7 @@
 """Turns of 30 degrees about each axis of public robots within joint limits, from the rest posture of their file."""
 
-import sys
 import time
 import warnings
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,10 +9,10 @@ from common.replay import pinocchio
 from scipy.spatial.transform import Rotation
 
 import reojax
-from any_robot_parts.files import Missing
+from any_robot_parts.files import folder_of
 
 ROBOTS = {
-    "SPART 7-joint arm": ("SPARTpy", "urdf/floating_7dof_manipulator.urdf"),
+    "SPART 7-joint arm": ("spartpy", "urdf/floating_7dof_manipulator.urdf"),
     "UR5": ("example-robot-data", "ur_description/urdf/ur5_robot.urdf"),
     "Panda": ("example-robot-data", "panda_description/urdf/panda.urdf"),
     "Ant": ("gymnasium", "envs/mujoco/assets/ant.xml"),
@@ -26,7 +23,7 @@ ROBOTS = {
     "dm_control humanoid": ("dm_control", "suite/humanoid.xml"),
     "G1, 29 joints": ("example-robot-data", "g1_description/urdf/g1_29dof_rev_1_0.urdf"),
     "Talos, reduced": ("example-robot-data", "talos_data/robots/talos_reduced.urdf"),
-    "iCub": ("icub-models", "iCubGazeboV2_5/model.urdf"),
+    "iCub": ("icub-models", "robots/iCubGazeboV2_5/model.urdf"),
 }
 """Name: package and file. Space arms, arms on a small base, quadrupeds, humanoids."""
 
@@ -42,7 +39,7 @@ def turning(quick: bool) -> dict[str, Any]:
 def _row(name: str, package: str, file: str) -> dict[str, Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        robot = reojax.load_robot(_folder(package) / file, shapes=False)
+        robot = reojax.load_robot(folder_of(package) / file, shapes=False)
     start = np.clip(np.zeros(robot.joints), robot.lower, robot.upper)
     found, seconds = [], []
     for axis in np.eye(3):
@@ -76,13 +73,3 @@ def _left(robot: reojax.Robot, path: reojax.FreePaths, target: np.ndarray) -> fl
     except RuntimeError:
         return None
     return Rotation.from_matrix(np.linalg.matrix_power(once, int(path.repeats)).T @ target).magnitude()
-
-
-def _folder(package: str) -> Path:
-    if package == "icub-models":
-        return Path(sys.prefix) / "share/iCub/robots"
-    found = find_spec("numpy" if package == "example-robot-data" else package)
-    if found is None or not found.submodule_search_locations:
-        raise Missing(f'{package} is not installed: pip install "reojax[zoo]"')
-    here = Path(found.submodule_search_locations[0])
-    return here.parent / "cmeel.prefix/share/example-robot-data/robots" if package == "example-robot-data" else here
