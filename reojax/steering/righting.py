@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from reojax import so3
 from reojax._internal import checks
 from reojax._internal.arrays import Array
-from reojax._internal.linalg import factor, solve_factored, solve_symmetric3
+from reojax._internal.linalg import cholesky, cholesky_solve, solve_symmetric3
 from reojax.collision.clearance import clearance as clearances
 from reojax.mechanics.dynamics import joint_inertia, joint_load
 from reojax.mechanics.momentum import momentum_matrices
@@ -474,8 +474,8 @@ def _solve_one(task: _Task, pieces: int, max_steps: int, points, goal, momentum,
         ease = jnp.where(s.settled, 0.0, 0.5)  # less effort first; in the end the target alone
         gradient = ease * effort_slope(points) + jnp.einsum("kcn,kc->n", by, push)
         jacobian = (slope[:, 1:-1] @ carry).reshape(3, size)
-        upper = factor(matrix)
-        solved = jax.vmap(partial(solve_factored, upper))(jnp.concatenate([gradient[None], jacobian]))
+        lower = cholesky(matrix, drop=True)
+        solved = cholesky_solve(lower, jnp.concatenate([gradient[None], jacobian]).T).T
         normal = jacobian @ solved[1:].T
         normal = normal + 1e-9 * (1e-3 + jnp.trace(normal)) * jnp.eye(3, dtype=dtype)
         wanted = -miss * jnp.minimum(1, 0.7 / jnp.maximum(length, 1e-12))

@@ -5,7 +5,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from reojax._internal.linalg import cholesky, solve_positive, solve_symmetric3
+from reojax._internal import linalg
+from reojax._internal.linalg import cholesky, cholesky_solve, solve_positive, solve_symmetric3
+
+LARGE = linalg.UNROLLED + 3
 
 
 def positive(n: int, seed: int = 0) -> np.ndarray:
@@ -13,11 +16,11 @@ def positive(n: int, seed: int = 0) -> np.ndarray:
     return root @ root.T + 0.1 * np.eye(n)
 
 
-@pytest.mark.parametrize("n", [1, 3, 8])
+@pytest.mark.parametrize("n", [1, 3, 8, LARGE])
 @pytest.mark.parametrize("columns", [(), (2,)])
 def test_solves(n, columns):
     matrix, right = positive(n), np.random.default_rng(1).normal(size=(n, *columns))
-    np.testing.assert_allclose(solve_positive(matrix, right), np.linalg.solve(matrix, right), rtol=1e-11)
+    np.testing.assert_allclose(solve_positive(matrix, right), np.linalg.solve(matrix, right), rtol=1e-10)
 
 
 def test_closed_form_of_three():
@@ -25,8 +28,36 @@ def test_closed_form_of_three():
     np.testing.assert_allclose(solve_symmetric3(matrix, right), np.linalg.inv(matrix), rtol=1e-11)
 
 
-def test_factor():
-    np.testing.assert_allclose(cholesky(positive(5)), np.linalg.cholesky(positive(5)), rtol=1e-12, atol=1e-14)
+@pytest.mark.parametrize("n", [5, LARGE])
+def test_factor_reads_the_lower_triangle(n):
+    lower = cholesky(np.tril(positive(n)))
+    np.testing.assert_allclose(lower, np.linalg.cholesky(positive(n)), rtol=1e-11, atol=1e-13)
+
+
+@pytest.mark.parametrize("drop", [False, True])
+def test_written_out_and_looped_are_the_same(drop, monkeypatch):
+    matrix, right = positive(6), np.random.default_rng(1).normal(size=(6, 2))
+    answers = []
+    for largest in (6, 5):
+        monkeypatch.setattr(linalg, "UNROLLED", largest)
+        lower = cholesky(matrix, drop=drop)
+        answers.append((lower, cholesky_solve(lower, right)))
+        text = jax.jit(lambda m, r: cholesky_solve(cholesky(m, drop=drop), r)).lower(matrix, right).as_text()
+        assert ("while" in text) == (largest == 5)
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-15), *answers)
+
+
+@pytest.mark.parametrize("n", [4, LARGE])
+def test_only_dropping_solves_a_singular_matrix(n):
+    root = np.random.default_rng(4).normal(size=(n, n - 1))
+    root[-1] = root[0]  # two components that the matrix cannot tell apart: the second one becomes 0
+    matrix = root @ root.T
+    right = matrix @ np.ones(n)
+    found = cholesky_solve(cholesky(matrix, drop=True), right)
+    np.testing.assert_allclose(matrix @ found, right, rtol=1e-8)
+    assert abs(found[-1]) < 1e-60
+    with jax.debug_nans(False):
+        assert not np.isfinite(solve_positive(-np.eye(n), np.ones(n))).any()
 
 
 def test_gradient_in_both_modes():
@@ -38,6 +69,7 @@ def test_gradient_in_both_modes():
     np.testing.assert_allclose((jax.jacfwd(f)(root) * step).sum(), difference, rtol=1e-6)
 
 
-def test_batches_call_no_lapack():
-    f = jax.vmap(jax.grad(lambda m: solve_positive(m, jnp.ones(3)).sum()))
-    assert "lapack_" not in jax.jit(f).lower(np.stack([positive(3)] * 2)).as_text()
+@pytest.mark.parametrize("n", [3, LARGE])
+def test_batches_call_no_lapack(n):
+    f = jax.vmap(jax.grad(lambda m: solve_positive(m, jnp.ones(n)).sum()))
+    assert "lapack_" not in jax.jit(f).lower(np.stack([positive(n)] * 2)).as_text()
