@@ -23,9 +23,9 @@ def solve_symmetric3(matrix: Float[Array, "3 3"], right: Float[Array, "3 k"]) ->
 
 
 UNROLLED = 12
-"""Largest matrix whose columns are written out one by one: a batch of 1000 is then solved three to four times faster than
-by a loop over columns (4 x 4: 0.09 ms against 0.22 ms; 12 x 12: 1.1 ms against 3.2 ms). But the time to compile grows
-with the size (12 x 12: 1.3 s; 24 x 24: 3.9 s, where the loop takes 0.4 s), and one large system is solved no faster."""
+"""Largest matrix whose columns are written out one by one: a batch of 1000 is then solved three to four times faster
+than by a loop over columns (4 x 4: 0.09 ms against 0.22 ms; 12 x 12: 1.1 ms against 3.2 ms). But the time to compile
+grows with the size (12 x 12: 1.3 s; 24 x 24: 3.9 s, the loop 0.4 s), and one large system is solved no faster."""
 
 
 def solve_positive(matrix: Float[Array, "n n"], right: Float[Array, "n ..."]) -> Float[Array, "n ..."]:
