@@ -1,5 +1,6 @@
 """The array types of every signature, and the one rule for the dtype of a result."""
 
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -24,6 +25,15 @@ def common_float(*trees: Any) -> np.dtype:
         if dtype not in (np.float32, np.float64):
             raise ValueError(f"there are numbers of type {dtype}; {_RULE}.")
     return min(floats, key=lambda d: d.itemsize, default=jax.dtypes.canonicalize_dtype(float))
+
+
+def kind_of_arrays(*trees: Any) -> tuple[Any, Callable[[Any], Any]]:
+    """Module and cast for a changed copy of `trees`: NumPy's unless JAX's arrays are about, in their lowest float."""
+    leaves = [leaf for leaf in jax.tree.leaves(trees) if hasattr(leaf, "dtype")]
+    xp = jnp if any(isinstance(leaf, jax.Array) for leaf in leaves) else np
+    floats = [leaf.dtype for leaf in leaves if jnp.issubdtype(leaf.dtype, jnp.floating)]
+    dtype = min(floats, key=lambda d: d.itemsize)
+    return xp, lambda array: xp.asarray(array, dtype)
 
 
 def is_concrete(value: Any) -> bool:

@@ -12,6 +12,7 @@ from reojax.robots.edits import (
     with_limits as with_limits,
     with_rotor_inertia as with_rotor_inertia,
 )
+from reojax.robots.locking import with_joint_locked as with_joint_locked
 from reojax.robots.planar import planar as planar
 from reojax.robots.prototype import prototype as prototype
 from reojax.robots.quadruped import quadruped as quadruped

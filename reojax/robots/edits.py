@@ -5,11 +5,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reojax._internal.arrays import is_concrete
+from reojax._internal.arrays import is_concrete, kind_of_arrays
 from reojax._internal.capsule_checks import check_capsules, check_pairs, default_pairs
 from reojax._internal.checks import index_of, refuse
 from reojax.capsules import Capsule
@@ -33,15 +32,15 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
     """
     if robot.links != 4:
         raise ValueError(f"{robot.name!r} has {robot.links} links; end links are defined for the four-link robot.")
-    xp, cast = _like(robot, inertia)
+    xp, cast = kind_of_arrays(robot, inertia)
     wanted = cast(inertia)
     if wanted.shape or (is_concrete(wanted) and not 0 < wanted < np.inf):
         raise ValueError(f"`inertia` is {wanted}; it must be one positive, finite number, in kg m^2.")
     mass, com, moment, axes, anchor = map(
-        _like(robot)[1], (robot.mass, robot.com, robot.inertia, robot.axis, robot.anchor)
+        kind_of_arrays(robot)[1], (robot.mass, robot.com, robot.inertia, robot.axis, robot.anchor)
     )
 
-    start, end = (_like(robot)[1](x) for x in (robot.capsule_start, robot.capsule_end))
+    start, end = (kind_of_arrays(robot)[1](x) for x in (robot.capsule_start, robot.capsule_end))
 
     def stretch(link: int, axis: Any, point: Any) -> tuple[Any, Any, Any]:
         """Centre of mass and inertia, polynomials in the factor by which the mass moves; and the capsules' ends."""
@@ -156,10 +155,10 @@ def _per_joint(
     robot: Robot, entry: str, value: Any, present: Any, *, least: float = -np.inf, finite: bool = True
 ) -> Any:
     if isinstance(value, Mapping):
-        xp, cast = _like(robot, *value.values())
+        xp, cast = kind_of_arrays(robot, *value.values())
         chosen = {index_of(f"a key of {entry}", key, robot.joint_names, "joint"): v for key, v in value.items()}
         value = xp.stack([cast(chosen.get(k, present[k])) for k in range(robot.joints)])
-    xp, cast = _like(robot, value)
+    xp, cast = kind_of_arrays(robot, value)
     array = cast(value)
     if array.shape not in ((), (robot.joints,)):
         raise ValueError(f"`{entry}` has shape {array.shape}; it must be one number or ({robot.joints},).")
@@ -167,12 +166,3 @@ def _per_joint(
         rule = "finite" if least == -np.inf else "finite and not negative"
         raise ValueError(f"`{entry}` is {array}; it must be {rule}.")
     return xp.broadcast_to(array, (robot.joints,))
-
-
-def _like(robot: Robot, *values: Any) -> tuple[Any, Any]:
-    """Array module and cast for an edit: NumPy unless JAX arrays are about, and the lowest float around."""
-    leaves = [leaf for leaf in (*jax.tree.leaves(robot), *values) if hasattr(leaf, "dtype")]
-    xp = jnp if any(isinstance(leaf, jax.Array) for leaf in leaves) else np
-    floats = [leaf.dtype for leaf in leaves if jnp.issubdtype(leaf.dtype, jnp.floating)]
-    dtype = min(floats, key=lambda d: d.itemsize)
-    return xp, lambda array: xp.asarray(array, dtype)
