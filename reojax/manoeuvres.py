@@ -5,11 +5,14 @@ joints turn opposite ways and the robot turns about roll; in B the last distal j
 turn the same way, and the robot turns mainly about yaw.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from math import pi
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array, as_numbers, is_concrete
@@ -38,6 +41,13 @@ SIX_BODY = Layout(joints=5, twist=(1, 3), bend=2, fold=(0, 4), fold_angle=(pi / 
 """The thesis's full cat: six links, the feet fold and unfold (thesis 1.4)."""
 
 
+REVERSAL = {"a": -1.0, "b": 1.0}
+"""How far the last distal joint turns per turn of the first one."""
+
+_ON = np.array([[0.0, 1, 1, 0, 0], [0.0, 0, 1, 1, 0], [0.0, 0, 1, 1, 0]])
+"""Corners of the loop as shares of its bend, first and last twist: bend, twist, unbend, untwist."""
+
+
 def manoeuvre_a(twist: ArrayLike, bend: ArrayLike, layout: Layout = FOUR_BODY) -> Path:
     """Manoeuvre A: bend, twist the distal joints opposite ways, unbend, untwist (thesis figure 2.1).
 
@@ -51,7 +61,7 @@ def manoeuvre_a(twist: ArrayLike, bend: ArrayLike, layout: Layout = FOUR_BODY) -
     Raises:
         ValueError: if an amplitude is not one finite number, or the layout contradicts itself.
     """
-    return _rectangle(twist, bend, layout, last=-1)
+    return _manoeuvre("a", twist, bend, layout)
 
 
 def manoeuvre_b(twist: ArrayLike, bend: ArrayLike, layout: Layout = FOUR_BODY) -> Path:
@@ -60,32 +70,51 @@ def manoeuvre_b(twist: ArrayLike, bend: ArrayLike, layout: Layout = FOUR_BODY) -
     On `FOUR_BODY` the polygon (0,0,0), (0,bend,0), (twist,bend,twist), (twist,0,twist), (0,0,0).
     Arguments and errors as for `manoeuvre_a`.
     """
-    return _rectangle(twist, bend, layout, last=1)
+    return _manoeuvre("b", twist, bend, layout)
 
 
-def _rectangle(twist: ArrayLike, bend: ArrayLike, layout: Layout, last: int) -> Path:
-    """Corners of the loop, the last distal joint turning `last` times the first one's way."""
-    twist, bend = _amplitude("twist", twist), _amplitude("bend", bend)
+def rectangle(twist: ArrayLike, bend: ArrayLike, last_twist: ArrayLike, layout: Layout = FOUR_BODY) -> Path:
+    """Bend, twist, unbend, untwist, the two distal joints to angles of their own; A and B are two of these loops.
+
+    On `FOUR_BODY` the polygon (0,0,0), (0,bend,0), (twist,bend,last_twist), (twist,0,last_twist), (0,0,0).
+    A layout that folds the feet folds them before and unfolds them after. Errors as for `manoeuvre_a`.
+
+    Args:
+        twist: final angle of the first distal joint [rad].
+        bend: final angle of the centre joint [rad].
+        last_twist: final angle of the last distal joint [rad].
+        layout: which joints twist, bend and fold.
+    """
+    given = {"twist": twist, "bend": bend, "last_twist": last_twist}
+    twist, bend, last = (_amplitude(entry, value) for entry, value in given.items())
     check_layout(layout)
-    first, second = layout.twist
-    bending = _shape(layout, {layout.bend: 1.0})
-    twisting = _shape(layout, {first: 1.0, second: float(last)})
-    on_twist = np.array([0.0, 0.0, 1.0, 1.0, 0.0])
-    on_bend = np.array([0.0, 1.0, 1.0, 0.0, 0.0])
-    folded = np.zeros((5, layout.joints))
+    dtype = min(twist.dtype, bend.dtype, last.dtype, key=lambda d: d.itemsize)
+    moves, folded = rectangle_corners(layout), np.tile(fold_angles(layout), (5, 1))
+    if layout.fold is not None:  # starts and ends with the feet unfolded
+        moves, folded = np.pad(moves, ((1, 1), (0, 0), (0, 0))), np.pad(folded, ((1, 1), (0, 0)))
+    moves, folded = moves.astype(dtype), folded.astype(dtype)
+    return polygon(folded + bend * moves[..., 0] + twist * moves[..., 1] + last * moves[..., 2])
+
+
+def rectangle_corners(layout: Layout) -> Float[np.ndarray, "5 j 3"]:
+    """Corners of the loop per bend, first twist and last twist: what every use of it is made from, feet left out."""
+    corners = np.zeros((5, layout.joints, 3))
+    for k, joint in enumerate((layout.bend, *layout.twist)):
+        corners[:, joint, k] = _ON[k]
+    return corners
+
+
+def fold_angles(layout: Layout) -> Float[np.ndarray, " j"]:
+    """Joint angles between loops: zero, but for folded feet [rad]."""
+    angles = np.zeros(layout.joints)
     if layout.fold is not None:
-        on_twist, on_bend = np.pad(on_twist, 1), np.pad(on_bend, 1)
-        folding = _shape(layout, dict(zip(layout.fold, layout.fold_angle, strict=True)))
-        folded = np.outer([0, 1, 1, 1, 1, 1, 0], folding)
-    dtype = min(twist.dtype, bend.dtype, key=lambda d: d.itemsize)
-    twisted, bent = np.outer(on_twist, twisting).astype(dtype), np.outer(on_bend, bending).astype(dtype)
-    return polygon(folded.astype(dtype) + twist * twisted + bend * bent)
+        angles[list(layout.fold)] = layout.fold_angle
+    return angles
 
 
-def _shape(layout: Layout, angles: dict[int, float]) -> np.ndarray:
-    shape = np.zeros(layout.joints)
-    shape[list(angles)] = list(angles.values())
-    return shape
+def _manoeuvre(name: str, twist: ArrayLike, bend: ArrayLike, layout: Layout) -> Path:
+    twist = _amplitude("twist", twist)
+    return rectangle(twist, bend, REVERSAL[name] * twist, layout)
 
 
 def _amplitude(entry: str, value: ArrayLike) -> Array:

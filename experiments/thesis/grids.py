@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 import reojax
 from reojax import robots
+from reojax.manoeuvres import rectangle
 from reojax.robots.prototype import END_INERTIA, GEAR_RATIO, ROTOR_INERTIA
 
 TWISTS = np.deg2rad([0, 67.5, 135, 202.5, 270])  # rad, thesis figures 2.7 and 2.10
@@ -63,9 +64,7 @@ def outcome(twist, bend, last, inertia, ratio, rotor) -> Turn:
     """Run a rectangle on the prototype with the given motors and end links; `last` is -1 for A and 1 for B."""
     robot = robots.with_rotor_inertia(robots.with_gear_ratio(robots.prototype(), ratio), rotor)
     robot = robots.with_end_inertia(robot, inertia)
-    on_twist, on_bend = np.array([0.0, 0, 1, 1, 0]), np.array([0.0, 1, 1, 0, 0])
-    corners = jnp.stack([twist * on_twist, bend * on_bend, last * twist * on_twist], axis=1)
-    history = reojax.rotation_history(robot, reojax.Path(corners), samples=8)
+    history = reojax.rotation_history(robot, rectangle(twist, bend, last * twist), samples=8)
     about_z = jnp.arctan2(history[:, 1, 0] - history[:, 0, 1], history[:, 0, 0] + history[:, 1, 1])
     end = history[-1]
     return Turn(

@@ -19,7 +19,7 @@ from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax._internal.checks import numbers
 from reojax.design.variables import Variable
-from reojax.manoeuvres import Layout
+from reojax.manoeuvres import Layout, check_layout, rectangle_corners
 from reojax.path import Path
 from reojax.robot import Robot, layout_of
 
@@ -61,11 +61,10 @@ def rectangles(
         ValueError: for a start outside of the joint limits, a joint without limits, or no layout.
     """
     layout = layout_of(robot) if layout is None else layout
-    order = [(layout.bend,), layout.twist]
-    edges = np.zeros((4, robot.joints, 3))
-    for edge, (side, sign) in enumerate(((0, 1), (1, 1), (0, -1), (1, -1))):
-        for joint in order[side]:
-            edges[edge, joint, (layout.bend, *layout.twist).index(joint)] = sign
+    check_layout(layout)
+    if layout.joints != robot.joints:
+        raise ValueError(f"`layout` is for {layout.joints} joints; {robot.name!r} has {robot.joints} joints.")
+    edges = np.diff(rectangle_corners(layout), axis=0)
     if lead:
         away = np.eye(robot.joints)[None]
         moves = np.zeros((6, robot.joints, 3 + robot.joints))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
-from reojax.manoeuvres import Layout
+from reojax.manoeuvres import Layout, fold_angles
 from reojax.planning import quaternions
 from reojax.planning.checks import a_robot, key_of, robot_and_layout
 from reojax.planning.clear_paths import Clear, check_clearance
@@ -22,7 +22,7 @@ from reojax.planning.freedom import Freedom, freedom_of
 from reojax.planning.polygon_table import table_of
 from reojax.planning.reach import Reach, reach_of
 from reojax.planning.repeats import MOST_REPEATS, least_repeats, repeated
-from reojax.planning.words import box_of, fold_angles
+from reojax.planning.words import box_of
 from reojax.robot import Robot
 
 _CORNERS = ((4, 8), (8, 6), (10**9, 5))

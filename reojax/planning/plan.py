@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
-from reojax.manoeuvres import Layout
+from reojax.manoeuvres import Layout, fold_angles
 from reojax.mechanics.controllable import controllable_directions
 from reojax.planning import quaternions
 from reojax.planning.candidates import Context, context, join
@@ -23,7 +23,7 @@ from reojax.planning.fewest import Answer, cheapest, fewest, rotation_from_folde
 from reojax.planning.reach import Reach
 from reojax.planning.result import Plan, first_of, plans
 from reojax.planning.store import Store
-from reojax.planning.words import VOCABULARIES, box_of, fold_angles
+from reojax.planning.words import VOCABULARIES, box_of
 from reojax.robot import Robot
 
 _BATCH = 4096

@@ -18,13 +18,13 @@ import numpy as np
 from jaxtyping import Float
 
 from reojax._internal.arrays import Array
-from reojax.manoeuvres import Layout
+from reojax.manoeuvres import Layout, fold_angles
 from reojax.mechanics._fast.parameters import Pattern, pattern_of
 from reojax.mechanics.holonomy import DEFAULT_STEPS, _net_rotation, net_rotation
 from reojax.mechanics.own_units import without_names
 from reojax.path import polygon
 from reojax.planning import quaternions
-from reojax.planning.words import AmplitudeBox, fold_angles, last_twist, loop_corners
+from reojax.planning.words import AmplitudeBox, last_twist, loop_corners
 from reojax.robot import Robot
 from reojax.session import usable_cores
 

@@ -14,13 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from reojax.manoeuvres import Layout
+from reojax.manoeuvres import REVERSAL, Layout, fold_angles, rectangle_corners
 from reojax.robot import Robot
 
 VOCABULARIES = {"manoeuvres": "AB", "rectangles": "R"}
 """Letters of each vocabulary of words."""
-_LAST = {"A": -1.0, "B": 1.0}
-"""How far the last distal joint turns per turn of the first one; R leaves it free."""
 
 
 class AmplitudeBox(NamedTuple):
@@ -59,7 +57,7 @@ def box_of(robot: Robot, layout: Layout, letters: str, twist_limit: float, bend_
         if letter == "R":
             rows = [twist, bend, other]
         else:
-            ends = sorted(_LAST[letter] * end for end in other)
+            ends = sorted(REVERSAL[letter.lower()] * end for end in other)
             rows = [(max(twist[0], ends[0]), min(twist[1], ends[1])), bend]
         low.append([row[0] for row in rows])
         high.append([row[1] for row in rows])
@@ -70,25 +68,13 @@ def last_twist(letters: str, word: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Angle of the last distal joint [rad] for amplitudes `x` (d, ...) of the letters `word` (...)."""
     if x.shape[0] == 3:
         return x[2]
-    return np.array([_LAST[letter] for letter in letters])[word] * x[0]
+    return np.array([REVERSAL[letter.lower()] for letter in letters])[word] * x[0]
 
 
 def loop_corners(layout: Layout, twist: np.ndarray, bend: np.ndarray, last: np.ndarray) -> np.ndarray:
     """Corners (m, 5, j) of rectangles with amplitudes (m,), feet folded."""
-    corners = np.zeros((len(twist), 5, layout.joints))
-    corners[:] = fold_angles(layout)
-    corners[:, 2:4, layout.twist[0]] = twist[:, None]
-    corners[:, 2:4, layout.twist[1]] = last[:, None]
-    corners[:, 1:3, layout.bend] = bend[:, None]
-    return corners
-
-
-def fold_angles(layout: Layout) -> np.ndarray:
-    """Joint angles (j,) between loops: zero, but for folded feet."""
-    angles = np.zeros(layout.joints)
-    if layout.fold is not None:
-        angles[list(layout.fold)] = layout.fold_angle
-    return angles
+    amplitudes = np.stack([bend, twist, last])
+    return fold_angles(layout) + np.einsum("vjk,km->mvj", rectangle_corners(layout), amplitudes)
 
 
 def word_corners(layout: Layout, twist: np.ndarray, bend: np.ndarray, last: np.ndarray) -> np.ndarray:
