@@ -2,10 +2,10 @@
 
 import json
 import os
-from pathlib import Path
 from typing import Any
 
 from reojax._internal.checks import shorten
+from reojax._internal.files import reading
 
 LARGEST = 64 * 2**20
 """Largest file that is read [bytes]."""
@@ -17,19 +17,10 @@ def read_bytes(path: str | os.PathLike[str], largest: int = LARGEST) -> bytes:
     Raises:
         ValueError: naming the path, if it is none, or larger than `largest`.
     """
-    if not isinstance(path, str | os.PathLike):
-        raise ValueError(f"`path` is {shorten(path)}; it must be the path of a file.")
-    name = shorten(os.fspath(path))
-    try:
-        if not Path(path).is_file():
-            what = "it is a folder" if Path(path).is_dir() else "there is no such regular file"
-            raise ValueError(f"cannot read {name}: {what}.")
-        with open(path, "rb") as file:
-            data = file.read(largest + 1)
-    except OSError as error:
-        raise ValueError(f"cannot read {name}: {error.strerror or error}.") from error
-    if len(data) > largest:
-        raise ValueError(f"cannot read {name}: it is larger than {largest} bytes.")
+    with reading(path, largest) as file:
+        data = file.read(largest + 1)
+    if len(data) > largest:  # it has grown meanwhile
+        raise ValueError(f"cannot read {shorten(os.fspath(path))}: it is larger than {largest} bytes.")
     return data
 
 

@@ -2,7 +2,6 @@
 
 import argparse
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, degrees, version
@@ -21,6 +20,8 @@ _KINDS = {"rotvec": 3, "zxz": 3, "quat": 4}
 _TOLD = 24
 """Most manoeuvres that are printed one by one; JSON and CSV have all of them."""
 _FRAMES = 120
+_LARGEST_MATRIX = 2**16
+"""Largest file that a target is read from [bytes]."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -110,18 +111,16 @@ def read_target(text: str) -> "np.ndarray":
 def _read_matrix(name: str) -> "np.ndarray":
     import numpy as np
 
-    try:
-        text = Path(name).read_text()
-    except OSError as error:
-        raise ValueError(f"cannot read the target file {name!r}: {error.strerror or error}.") from error
-    except UnicodeDecodeError:
-        raise ValueError(f"cannot read the target file {name!r}: it is not text.") from None
+    from reojax._internal.checks import shorten
+    from reojax._internal.files import read_text
+
+    text = read_text(name, _LARGEST_MATRIX)
     try:
         numbers = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:
-        raise ValueError(f"the target file {name!r} has something that is not a number.") from None
+        raise ValueError(f"the target file {shorten(name)} has something that is not a number.") from None
     if len(numbers) != 9:
-        raise ValueError(f"the target file {name!r} has {len(numbers)} numbers; a rotation matrix has nine.")
+        raise ValueError(f"the target file {shorten(name)} has {len(numbers)} numbers; a rotation matrix has nine.")
     return np.array(numbers).reshape(3, 3)
 
 

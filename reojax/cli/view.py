@@ -1,7 +1,6 @@
 """Show a turn in a browser: a manoeuvre or a plan as one HTML file, or the robot live with sliders (`--live`)."""
 
 import argparse
-import json
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
 
@@ -108,13 +107,10 @@ def read_plan(name: str) -> dict[str, Any]:
     Raises:
         ValueError: if it cannot be read, or is something else.
     """
-    try:
-        report = json.loads(File(name).read_text("utf-8"))
-    except OSError as error:
-        raise ValueError(f"cannot read the plan {name!r}: {error.strerror or error}.") from error
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"cannot read the plan {name!r}: it is not JSON.") from error
-    if isinstance(report, dict) and report.get("format") == "reojax plan":
+    from reojax._internal.json_files import read_object
+
+    report = read_object(name)
+    if report.get("format") == "reojax plan":
         from reojax.planning.plan_file import load_plan
 
         saved = load_plan(name)
@@ -125,7 +121,7 @@ def read_plan(name: str) -> dict[str, Any]:
             "target_matrix": saved.rotation if saved.target is None else saved.target,
         }
     keys = ("config", "waypoints_rad", "target_matrix")
-    if not isinstance(report, dict) or any(key not in report for key in keys):
+    if any(key not in report for key in keys):
         raise ValueError(
             f"{name!r} is not a plan: it must have {', '.join(keys)}, as `reojax plan --json` prints them."
         )

@@ -120,6 +120,8 @@ def at(table: Mapping[str, np.ndarray], time: float) -> dict[str, np.ndarray]:
 
 def read(path: str | Path) -> dict[str, np.ndarray]:
     """Read the table of a CSV file that `write_gains` wrote."""
+    if not Path(path).is_file():
+        raise ValueError(f"{str(path)!r} is not a regular file.")
     with open(path, encoding="utf-8") as file:
         names = file.readline().strip().split(",")
         rows = np.loadtxt(file, delimiter=",", ndmin=2)

@@ -71,7 +71,7 @@ def test_show_knows_the_named_robots(capsys):
     ("args", "words"),
     [
         (("nothing",), "no robot named 'nothing'"),
-        (("nothing.urdf",), "no such regular file"),
+        (("nothing.urdf",), "No such file"),
         (("prototype", "--lock", "bend=0"), "are for files"),
         (("{}", "--lock", "rail"), "must be a joint's name"),
         (("{}", "--lock", "ghost=1"), "`lock` names 'ghost'; the joints are"),

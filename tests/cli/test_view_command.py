@@ -37,7 +37,7 @@ def test_page_of_two_plans_in_time(tmp_path):
 REFUSED = {
     "there is no folder": ["--out", "nowhere/turn.html"],
     "ends in one of .html": ["--out", "turn.png"],
-    "cannot read the plan": ["nothing.json"],
+    "cannot read 'nothing.json'": ["nothing.json"],
     "there is no robot": ["--robot", "hal"],
     "it shows the robot alone": ["--live", "--out", "turn.html"],
 }

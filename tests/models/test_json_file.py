@@ -138,5 +138,5 @@ def test_files_that_are_none(tmp_path):
     for path in (tmp_path, tmp_path / "nothing.json", "/dev/zero"):
         with pytest.raises(ValueError, match="cannot read"):
             load_robot(path)
-    with pytest.raises(ValueError, match="must be the path of a file"):
+    with pytest.raises(ValueError, match="not the path of a file"):
         load_robot(1)
