@@ -18,6 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from common.script import options, run
+from matplotlib import colormaps
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
@@ -203,7 +204,9 @@ def draw(swept: dict[str, Turn], inertias: np.ndarray) -> Figure:
     figure = Figure(figsize=(11, 8), layout="constrained")
     figure.suptitle("The prototype with fitted numbers: the sweeps of thesis figures 2.7 to 2.10")
     (top_left, top_right), (low_left, low_right) = figure.subplots(2, 2)
-    shades = [f"C{k}" for k in range(5)]
+    shades = colormaps["cividis"](
+        np.linspace(0.9, 0.0, 5)
+    )  # more is darker; also in grey print and to colour-blind eyes
 
     band = {"color": "0.88", "zorder": 0, "label": "thesis, 174° to 192°"}
     roll = swept["a"].roll.reshape(5, 5)
@@ -220,7 +223,7 @@ def draw(swept: dict[str, Turn], inertias: np.ndarray) -> Figure:
     top_right.text(
         97, 0.03, "thesis: helps", transform=top_right.get_xaxis_transform(), ha="right", color="0.4", rotation=90
     )
-    (line,) = top_right.plot(inertias * 1e6, swept["inertia"].roll, "o-", ms=3, color="C0", label="roll (left)")
+    (line,) = top_right.plot(inertias * 1e6, swept["inertia"].roll, "o-", ms=3, color="#0072b2", label="roll (left)")
     top_right.set(
         title="A at 270°/120°, end links (2.8)",
         xlabel="end link inertia about the distal joint [kg mm²]",
@@ -228,7 +231,9 @@ def draw(swept: dict[str, Turn], inertias: np.ndarray) -> Figure:
         xlim=(0, 200),
     )
     right = top_right.twinx()
-    (other,) = right.plot(inertias * 1e6, swept["inertia"].tilt, "s--", ms=3, color="C3", label="off-axis tilt (right)")
+    (other,) = right.plot(
+        inertias * 1e6, swept["inertia"].tilt, "s--", ms=3, color="#d55e00", label="off-axis tilt (right)"
+    )
     right.set(ylabel="tilt of the roll axis [deg]", ylim=(0, 4.5))
     top_right.legend(handles=[line, other], loc="lower right", fontsize=9)
 

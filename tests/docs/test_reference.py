@@ -4,6 +4,7 @@ import importlib
 import importlib.util
 import inspect
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -66,3 +67,20 @@ def test_the_gallery_is_a_notebook_too(tmp_path):
         import nbformat
 
         nbformat.validate(nbformat.reads(json.dumps(book), as_version=4))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("nbclient") is None, reason="no nbclient: pip install reojax[docs]")
+def test_the_gallery_runs_as_a_notebook(tmp_path):
+    """In a kernel of its own, from an empty folder; what it draws lies there afterwards."""
+    import nbclient
+    import nbformat
+
+    page = (ROOT / "docs" / "gallery.md").read_text()
+    book = nbformat.reads(reference.notebook(page), as_version=4)
+    nbclient.NotebookClient(book, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    printed = [out for cell in book.cells if cell.cell_type == "code" for out in cell.outputs]
+    assert any("True" in out.get("text", "") for out in printed)
+    made = re.findall(r'"(\w+\.(?:png|html))"', page)
+    assert made
+    assert all((tmp_path / name).stat().st_size > 1000 for name in made)
