@@ -11,7 +11,8 @@ from common.types import Array
 
 import reojax
 from reojax import so3
-from reojax.steering.feedback import Reading, SteeringLaw
+from reojax.steering.feedback import SteeringLaw
+from reojax.steering.readings import Reading
 
 TICK = 2e-3
 """Time between readings of the joints and commands [s]: 500 Hz."""

@@ -9,7 +9,8 @@ import pytest
 import reojax
 from reojax import RE_MAX_17, robots, so3
 from reojax.optimisation.status import Status
-from reojax.steering.righting import Righting, righting, righting_many
+from reojax.steering.result import Righting
+from reojax.steering.righting import righting, righting_many
 
 ROBOT = robots.prototype()
 INERTIA = np.asarray(reojax.momentum_matrices(ROBOT, np.zeros(3)).A)

@@ -8,7 +8,9 @@ import pytest
 import reojax
 from reojax import robots, so3
 from reojax.steering import onboard
-from reojax.steering.feedback import Reading, Steering, smooth, steer_by
+from reojax.steering.feedback import Steering
+from reojax.steering.linear_law import smooth, steer_by
+from reojax.steering.readings import Reading
 from reojax.steering.tables import gain_table
 
 ROBOT = robots.prototype()

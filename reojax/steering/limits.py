@@ -1,0 +1,80 @@
+"""What must stay within bounds along a motion: joint angles, the motors' voltages, the clearance of collision pairs."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from reojax._internal.arrays import Array
+from reojax.collision.clearance import clearance as clearances
+from reojax.mechanics.dynamics import joint_load
+from reojax.motion.motor import Motor, demand
+from reojax.robot import Robot
+
+FEASIBLE = 1e-4
+"""How far a limit may be passed: rad, share of the supply, or m."""
+_SOFT = 0.02
+"""Power over which driving turns into being driven back [W]."""
+
+
+class Task(NamedTuple):
+    """What all motions of a search share."""
+
+    robot: Robot
+    motors: Motor | None
+    clearance: Array | None
+    start: Array
+    end: Array
+    weights: Array
+
+
+def bounds(task: Task) -> tuple[Float[Array, " c"], Float[Array, " c"]]:
+    """Lowest and highest value of each condition of `conditions`."""
+    robot = task.robot
+    dtype = robot.mass.dtype
+    pairs: list[tuple[Any, Any]] = [(robot.lower, robot.upper)]
+    if task.motors is not None:
+        pairs.append((-jnp.ones(robot.joints, dtype), jnp.ones(robot.joints, dtype)))
+    if task.clearance is not None:
+        count = len(robot.collision_pairs)
+        pairs.append((jnp.full(count, task.clearance), jnp.full(count, jnp.inf)))
+    low, high = (jnp.concatenate(side) for side in zip(*pairs, strict=True))
+    return low, high
+
+
+def conditions(task: Task, state: Float[Array, " 3j+3"]) -> Float[Array, " c"]:
+    """What is limited, at one node, of `(theta, theta_dot, theta_ddot, h)` with the momentum `h` in the base frame."""
+    robot = task.robot
+    theta, rate, acceleration, h = jnp.split(state, np.cumsum([robot.joints] * 3))
+    parts: list[Any] = [theta]
+    if task.motors is not None:
+        load = joint_load(robot, theta, rate, acceleration, momentum=h)
+        squared, linear, constant = demand(robot, task.motors, rate, load, soft=_SOFT)
+        parts.append((squared + linear.sum(0) + constant) / task.motors.supply)
+    if task.clearance is not None:
+        parts.append(clearances(robot, theta))
+    return jnp.concatenate(parts)
+
+
+def states(
+    rows: Float[Array, "k 3 p+1"], points: Float[Array, "p+1 j"], rotation: Float[Array, "k 3 3"], momentum: Array
+) -> Float[Array, "k 3j+3"]:
+    """What `conditions` reads, at each node."""
+    joints = jnp.einsum("kop,pj->koj", rows, points).reshape(len(rows), -1)
+    return jnp.concatenate([joints, rotation.swapaxes(1, 2) @ momentum], axis=1)
+
+
+def conditions_and_slopes(
+    task: Task, state: Float[Array, "k 3j+3"], lift: Float[Array, "k 3 j n"]
+) -> tuple[Float[Array, "k c"], Float[Array, "k c n"]]:
+    """`conditions` at all nodes, and how they change with what `lift` carries to the nodes; `h` is held."""
+    joints = task.robot.joints
+    if task.motors is None and task.clearance is None:
+        return state[:, :joints], lift[:, 0]
+    slope = jax.vmap(jax.jacfwd(lambda s: conditions(task, s)))(state)[:, :, : 3 * joints]
+    value = jax.vmap(lambda s: conditions(task, s))(state)
+    return value, slope @ lift.reshape(len(state), 3 * joints, -1)
