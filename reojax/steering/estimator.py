@@ -71,6 +71,11 @@ def changed(robot: Robot, chosen: tuple[Parameter, ...], values: Array) -> Robot
     return robot
 
 
+def off(model: Model, values: Array) -> Array:
+    """How far the parameters are from what the motion was planned with."""
+    return values - jnp.asarray([p.start for p in model.parameters], values.dtype)
+
+
 class Estimate(NamedTuple):
     """What is believed at one time; the rest is in the state."""
 

@@ -24,7 +24,7 @@ class Points(NamedTuple):
     def of(self, x: Float[Array, " n"]) -> Float[Array, "p+1 j"]:
         """All points."""
         inner = x.reshape(-1, self.carry.shape[1]) @ self.carry.T
-        return self.ends.at[1:-1].set(inner + self.offset[None])
+        return jnp.asarray(self.ends).at[1:-1].set(inner + self.offset[None])
 
     def slopes(self, rows: Float[Array, "k o p+1"]) -> Float[Array, "k o j n"]:
         """How the joints at the nodes change with `x`, where `rows` gives them from the points."""

@@ -46,7 +46,7 @@ def bounds(task: Task) -> tuple[Float[Array, " c"], Float[Array, " c"]]:
     return low, high
 
 
-def conditions(task: Task, state: Float[Array, " 3j+3"]) -> Float[Array, " c"]:
+def conditions(task: Task, state: Float[Array, " s"]) -> Float[Array, " c"]:
     """What is limited, at one node, of `(theta, theta_dot, theta_ddot, h)` with the momentum `h` in the base frame."""
     robot = task.robot
     theta, rate, acceleration, h = jnp.split(state, np.cumsum([robot.joints] * 3))
@@ -62,14 +62,14 @@ def conditions(task: Task, state: Float[Array, " 3j+3"]) -> Float[Array, " c"]:
 
 def states(
     rows: Float[Array, "k 3 p+1"], points: Float[Array, "p+1 j"], rotation: Float[Array, "k 3 3"], momentum: Array
-) -> Float[Array, "k 3j+3"]:
+) -> Float[Array, "k s"]:
     """What `conditions` reads, at each node."""
     joints = jnp.einsum("kop,pj->koj", rows, points).reshape(len(rows), -1)
     return jnp.concatenate([joints, rotation.swapaxes(1, 2) @ momentum], axis=1)
 
 
 def conditions_and_slopes(
-    task: Task, state: Float[Array, "k 3j+3"], lift: Float[Array, "k 3 j n"]
+    task: Task, state: Float[Array, "k s"], lift: Float[Array, "k 3 j n"]
 ) -> tuple[Float[Array, "k c"], Float[Array, "k c n"]]:
     """`conditions` at all nodes, and how they change with what `lift` carries to the nodes; `h` is held."""
     joints = task.robot.joints

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
-from reojax._internal.arrays import as_numbers
+from reojax._internal.arrays import Array, as_numbers
 from reojax.robot import Robot
 
 MEMORY = 64
