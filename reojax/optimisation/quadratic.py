@@ -51,6 +51,32 @@ def solve_quadratic(
 
     Variables with `low == high` are held; `low` and `high` may be infinite.
     """
+    free = high > low
+    if free.all() or not free.any():
+        return _solve(hessian, gradient, rows, offset, equalities, low, high)
+    d = np.where(free, 0.0, low)  # a program of fewer variables is quicker
+    part = _solve(
+        hessian[np.ix_(free, free)],
+        gradient[free] + hessian[free] @ d,
+        rows[:, free],
+        offset + rows @ d,
+        equalities,
+        low[free],
+        high[free],
+    )
+    d[free] = part.d
+    return part._replace(d=d)
+
+
+def _solve(
+    hessian: np.ndarray,
+    gradient: np.ndarray,
+    rows: np.ndarray,
+    offset: np.ndarray,
+    equalities: int,
+    low: np.ndarray,
+    high: np.ndarray,
+) -> Step:
     import daqp  # not needed before something is optimised
 
     n, last = len(gradient), len(gradient) + equalities

@@ -29,8 +29,11 @@ from reojax.robot import Robot
 COARSE, FINE = 2, 8
 """Steps per edge while searching, and when judging: on the prototype within 270 degrees the coarse ones miss the true
 rotation by some 1e-5, which the last solutions make up for, the fine ones by 1e-13."""
-_CALL = 256
-"""Polygons whose rotations are computed together."""
+_CALL, _CALL_LONG = 256, 8
+"""Polygons whose rotations are computed together, and of robots with more than `ALONE` joints."""
+ALONE = 9
+"""Joints of a robot beyond which polygons are improved one by one: the kernels' loops over joints, which compile in a
+fraction of the time, take less for one polygon than their share of many side by side."""
 _SAMPLES = 16
 """Postures per edge at which the clearance is held while searching; answers are proven afterwards."""
 _KEPT = 8
@@ -48,8 +51,10 @@ class Aim(NamedTuple):
     """Postures at the start and at the end."""
     rounding: Float[Array, ""]
     """Rounding of the travel on each edge [rad]."""
+    short: Float[Array, ""]
+    """1 where travel is made least."""
     far: Float[Array, ""]
-    """0 where travel is made least, 1 where `turn` is made largest."""
+    """1 where `turn` is made largest. Where both are 0 only the target counts."""
     margin: Float[Array, ""]
     """Clearance to keep [m]; of no effect where none is asked for."""
 
@@ -60,7 +65,7 @@ class Polygons(NamedTuple):
     corners: int
     moves: Float[np.ndarray, "j k"]
     travel: Callable[[Array, Aim], Array]
-    """Joint travel, rounded off; or `turn` with a minus, where an aim is to go far."""
+    """Joint travel, rounded off; `turn` with a minus, where an aim is to go far; or zero."""
     miss: Callable[[Array, Aim], Array]
     """Rotation vector (3,) from the target, by `COARSE` steps."""
     too_near: Callable[[Array, Aim], Array]
@@ -77,7 +82,8 @@ class Polygons(NamedTuple):
 
     def rotations(self, paths: np.ndarray, steps: int = FINE) -> np.ndarray:
         """Net rotations (m, 3, 3) of whole paths (m, v, j)."""
-        calls = [np.arange(i, i + _CALL) for i in range(0, len(paths), _CALL)]
+        size = _CALL_LONG if paths.shape[2] > ALONE else _CALL
+        calls = [np.arange(i, i + size) for i in range(0, len(paths), size)]
         found = [np.asarray(self.turned(paths[np.minimum(call, len(paths) - 1)], steps), float) for call in calls]
         return np.concatenate(found)[: len(paths)] if found else np.zeros((0, 3, 3))
 
@@ -103,7 +109,7 @@ def _polygons_of(robot: Robot, joints: tuple[int, ...], moves: np.ndarray, corne
         first, last = aim.ends[0][place], aim.ends[1][place]
         edges = jnp.diff(jnp.concatenate([first[None], inner(x), last[None]]), axis=0)
         rounded = jnp.sqrt(edges * edges + aim.rounding**2) - aim.rounding
-        return (1 - aim.far) * (rounded * weight[None]).sum() - aim.far * x[-1]
+        return aim.short * (rounded * weight[None]).sum() - aim.far * x[-1]
 
     def points(x: Array, aim: Aim) -> Array:
         base = aim.ends[0] - moves @ aim.ends[0][place]

@@ -16,7 +16,7 @@ import numpy as np
 from reojax.optimisation.optimise import optimise
 from reojax.planning import quaternions
 from reojax.planning.clear_paths import Clear
-from reojax.planning.free_polygons import COARSE, Aim, Polygons
+from reojax.planning.free_polygons import ALONE, COARSE, Aim, Polygons
 from reojax.planning.freedom import Freedom
 from reojax.planning.polygon_table import PolygonTable
 
@@ -36,8 +36,8 @@ _REACHED, _NEAR = 1e3, 1e7
 """How many times that much counts as on the target for the time being, and how many as near to it."""
 _LAST = 4
 """How often, at most, the target is shifted to bring the true rotation onto it."""
-_ANY = 1e6
-"""Slope that stops the solver as soon as the target is met."""
+_IDLE = 1e-3
+"""Joints that move less than this anywhere on a path [rad], where they may go a radian or more, are held at the end."""
 _OFF = 1e6
 """Joint travel [rad] that is worse than any."""
 _SPARE = 0.02
@@ -96,7 +96,7 @@ class Search:
         x[:, :, -1] = np.minimum(x[:, :, -1], _MOST_TURN)
         owner, shape = np.repeat(np.arange(len(axes)), x.shape[1]), x.shape
         still = np.broadcast_to(np.eye(3), (len(owner), 3, 3))
-        found, miss, _ = self._solve(x.reshape(len(owner), -1), still, _MISS, _ROUND, self.max_steps, 1e-3, axes[owner])
+        found, miss, _ = self._solve(x.reshape(len(owner), -1), still, _MISS, _ROUND, 1e-3, axes[owner])
         turn = np.where(miss < _REACHED * _MISS, found[:, -1], 0.0).reshape(shape[:2])
         found = found.reshape(shape)
         found[:, :, -1] = 0.0
@@ -107,41 +107,50 @@ class Search:
         x: np.ndarray,
         targets: np.ndarray,
         exact: float,
-        rounding: float,
-        steps: int,
+        rounding: float | None,
         slope: float = _SLOPE,
         axes: np.ndarray | None = None,
+        held: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Improve polygons (m, n) for targets (m, 3, 3), or for turning far about `axes`: polygons, misses, travel."""
-        rows = min(_ROWS, max(8, 1 << (len(x) - 1).bit_length()))
+        """Improve polygons (m, n) for targets (m, 3, 3), or for turning far about `axes`: polygons, misses, travel.
+
+        Without a `rounding` of the travel only the target counts; variables `held` (m, n) stay as they are.
+        """
+        rows = 1 if len(self.freedom.start) > ALONE else min(_ROWS, max(8, 1 << (len(x) - 1).bit_length()))
         ends = np.stack([self.freedom.start, self.freedom.end])
         turning = axes is not None
         upper = self._high.copy()
         upper[-1] = min(_MOST_TURN, _FARTHER * x[:, -1].max()) if turning else 0.0
+        low, high = (np.repeat(box[None], len(x), 0) for box in (self._low, upper))
+        if held is not None:
+            low, high = np.where(held, x, low), np.where(held, x, high)
         parts = [(x[:0], np.zeros(0), np.zeros(0))]
         self._bar.total += len(x)
         for first in range(0, len(x), rows):
+            size = min(rows, len(x) - first)
             take = np.minimum(np.arange(first, first + rows), len(x) - 1)
+            wanted = targets[take].copy()
+            wanted[size:] = np.nan  # what fills the program's shape ends at once
             found = optimise(
                 self.polygons.travel,
                 x[take],
-                lower=self._low,
-                upper=upper,
+                lower=low[take],
+                upper=high[take],
                 equality=self.polygons.miss,
                 inequality=None if self.clear is None else self.polygons.too_near,
                 data=Aim(
-                    target=targets[take],
+                    target=wanted,
                     axis=axes[take] if turning else np.zeros((rows, 3)),
                     ends=np.repeat(ends[None], rows, 0),
-                    rounding=np.full(rows, rounding * self._fine),
+                    rounding=np.full(rows, (rounding or 1.0) * self._fine),
+                    short=np.full(rows, float(rounding is not None and not turning)),
                     far=np.full(rows, float(turning)),
                     margin=np.full(rows, 0.0 if self.clear is None else self.clear.margin + self.spare),
                 ),
                 tolerance=exact,
                 slope_tolerance=slope,
-                max_steps=steps,
+                max_steps=self.max_steps,
             )
-            size = min(rows, len(x) - first)
             parts.append((found.value[:size], found.residual[:size], found.cost[:size]))
             self._bar.update(size)
         value, miss, cost = map(np.concatenate, zip(*parts, strict=True))
@@ -159,9 +168,7 @@ class Search:
                 break
             x = tried[waiting, first : first + self.starts]
             owner, shape = np.repeat(waiting, x.shape[1]), x.shape
-            x, miss, travel = self._solve(
-                x.reshape(len(owner), -1), targets[owner], exact[waiting].min(), _ROUND, self.max_steps
-            )
+            x, miss, travel = self._solve(x.reshape(len(owner), -1), targets[owner], exact[waiting].min(), _ROUND)
             tried[waiting, first : first + self.starts] = x.reshape(shape)
             if self.clear is not None:  # what touches between the samples is no answer
                 miss = np.where(self.clear.kept(self.polygons.paths(x, self.freedom)), miss, 10.0 + miss)
@@ -194,8 +201,8 @@ class Search:
             # what the coarse steps have to show for the true rotation to be the one wanted
             shifted = wanted[going] @ turned[going].swapaxes(1, 2) @ coarse[going]
             aim = np.where(near[going, None, None], shifted, wanted[going])
-            slope = _ANY if k else _SLOPE
-            moved, _, _ = self._solve(x[going], aim, exact[going].min(), _SHARP, self.max_steps, slope)
+            start = x[going]
+            moved, _, _ = self._solve(start, aim, exact[going].min(), None if k else _SHARP, held=self._idle(start))
             true, few = self._rotations(moved)
             off = apart(true, wanted[going])
             better = off < (error[going] if k else np.maximum(error, _NEAR * exact)[going])
@@ -206,6 +213,15 @@ class Search:
             error = np.where(self.clear.kept(paths), error, 10.0 + error)  # worse than any miss
         worth = _worth(error, np.abs(np.diff(paths, axis=1)).sum((1, 2)), tolerance).reshape(shape)
         return np.take_along_axis(x.reshape(*shape, -1), worth.argmin(1)[:, None, None], 1)[:, 0]
+
+    def _idle(self, x: np.ndarray) -> np.ndarray:
+        """Which variables (m, n) belong to joints that hardly move; a polygon needs three joints that do."""
+        count, place = len(self.freedom.low), list(self.freedom.joints)
+        ends = np.stack([self.freedom.start[place], self.freedom.end[place]])
+        corners = x[:, :-1].reshape(len(x), self.polygons.corners, count)
+        farthest = np.maximum(np.abs(corners - ends[0]).max(1), np.abs(ends[1] - ends[0]))
+        idle = farthest < np.minimum(_IDLE * self._fine, np.sort(farthest, axis=1)[:, -3:].min(1)[:, None])
+        return np.pad(np.tile(idle, self.polygons.corners), ((0, 0), (0, 1)))
 
     def _rotations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Net rotations (m, 3, 3) of polygons (m, n), true ones and those by the steps of the search."""
