@@ -31,6 +31,7 @@ from reojax.captures.alignment import align_frames, interpolate
 from reojax.captures.capture import Capture
 from reojax.captures.orientation import chain, edge_turn, fill_gaps, fill_up, steps_needed
 from reojax.captures.parameters import Parameter, Put, resolve
+from reojax.mechanics.own_units import without_names
 from reojax.robot import Robot
 
 SINGULAR = 1e-6
@@ -205,7 +206,7 @@ class _Problem:
 
     def _orientation(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Orientation at every frame, and the effect of parameters and ends of each edge on all later ones."""
-        turns, effect = _edges(tuple(p.put for p in self.fitted), x, self.robot, self.theta, self.steps)
+        turns, effect = _edges(tuple(p.put for p in self.fitted), x, without_names(self.robot), self.theta, self.steps)
         turned = chain(np.asarray(turns)[: self.edges])
         return turned, turned[1:] @ np.asarray(effect)[: self.edges]
 

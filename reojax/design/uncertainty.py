@@ -21,6 +21,7 @@ from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.design.tolerances import Sources, across, perturb, sources_of
 from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation
+from reojax.mechanics.own_units import without_names
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -94,7 +95,7 @@ def sensitivities(robot: Robot, path: Path, *, frame: Frame = "start", steps: in
         ValueError: for an unknown frame, and as `net_rotation`.
     """
     _check_frame(frame)
-    slopes, rotation = _slopes(robot, path, steps)
+    slopes, rotation = _slopes(without_names(robot), path, steps)
     rows = list(_rows(robot, slopes))
     derivative = np.stack([row[2] for row in rows])
     if frame == "end":
@@ -144,7 +145,7 @@ def spread(
     checks.whole("samples", samples, 2)
     sources = sources_of(robot, tolerances)
     nominal = net_rotation(robot, path, steps=steps)
-    jacobian = np.asarray(_jacobian(robot, path, sources, steps))  # (3, k)
+    jacobian = np.asarray(_jacobian(without_names(robot), path, sources, steps))  # (3, k)
     errors = np.random.default_rng(seed).normal(size=(samples, len(sources.name)))
 
     def turn(**error: Array) -> Array:

@@ -22,6 +22,7 @@ from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.mechanics.curvature import curvature_terms
 from reojax.mechanics.input_checks import check_motion
+from reojax.mechanics.own_units import without_names
 from reojax.robot import Robot
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ def controllable_directions(
     shares = np.append((np.arange(_STEPS)[:, None] + _GAUSS) / _STEPS, 1.0)
     shapes = np.concatenate([np.zeros((1, count)), (shares[:, None, None] * ray).reshape(-1, count)])
     with jax.enable_x64(True):
-        double = jax.tree.map(lambda leaf: np.asarray(leaf, float), robot)
+        double = jax.tree.map(lambda leaf: np.asarray(leaf, float), without_names(robot))
         terms = _terms(double, theta + shapes @ moves.T)
     gamma, slope, field = (np.asarray(part) for part in terms)
     gamma, i, k = gamma @ moves, *np.triu_indices(count, 1)

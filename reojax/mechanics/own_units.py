@@ -41,25 +41,27 @@ def in_own_units(robot: Robot) -> Robot:
     )
 
 
-def without_names(robot: Robot) -> Robot:
-    """The robot without names, notes, layout, couplings and shapes, none of which the mechanics reads.
+_SHAPES = {
+    "capsule_start": _NO_VECTORS,
+    "capsule_end": _NO_VECTORS,
+    "capsule_radius": _NO_NUMBERS,
+    "capsule_link": (),
+    "collision_pairs": (),
+}
+_COUPLINGS = {"coupling_ratio": _NO_NUMBERS, "coupling_offset": _NO_NUMBERS, "couplings": ()}
+
+
+def without_names(robot: Robot, *, shapes: bool = False, couplings: bool = False) -> Robot:
+    """The robot without names, notes and layout; and without shapes and couplings, which the mechanics does not read.
 
     What is static in a robot is part of the key of every compiled program that takes it; a program that takes this one
     serves all robots of one tree.
+
+    Args:
+        robot: the robot.
+        shapes: keep its capsules and pairs, for what asks for clearances.
+        couplings: keep which joints follow others, for what chooses how they move.
     """
-    return dataclasses.replace(
-        robot,
-        link_names=("",) * robot.links,
-        joint_names=("",) * robot.joints,
-        name="",
-        capsule_start=_NO_VECTORS,
-        capsule_end=_NO_VECTORS,
-        capsule_radius=_NO_NUMBERS,
-        coupling_ratio=_NO_NUMBERS,
-        coupling_offset=_NO_NUMBERS,
-        capsule_link=(),
-        collision_pairs=(),
-        couplings=(),
-        layout=None,
-        notes=(),
-    )
+    gone = ({} if shapes else _SHAPES) | ({} if couplings else _COUPLINGS)
+    names = {"link_names": ("",) * robot.links, "joint_names": ("",) * robot.joints, "name": ""}
+    return dataclasses.replace(robot, layout=None, notes=(), **names, **gone)

@@ -21,6 +21,7 @@ from reojax._internal import checks
 from reojax._internal.arrays import Array, common_float, is_concrete
 from reojax.collision.refusal import require_clearance
 from reojax.mechanics.dynamics import joint_load
+from reojax.mechanics.own_units import without_names
 from reojax.motion.motor import Motor, check_motors, demand, per_joint
 from reojax.motion.time_laws import Law, check_law
 from reojax.motion.trajectory import State, Trajectory, along, polynomial
@@ -86,7 +87,7 @@ def minimum_time(
     law = check_law(law)
     trajectory = along(path, law, 1.0)
     _check_fit(robot, trajectory)
-    times, place = _instants(robot, trajectory, motors, _count(samples))
+    times, place = _instants(without_names(robot), trajectory, motors, _count(samples))
     needs = times.reshape(path.edges, -1, robot.joints)
     flat = needs.reshape(path.edges, -1)
     worst = jnp.argmax(flat, axis=1)
@@ -110,7 +111,7 @@ def minimum_stretch(
     """
     motors = _able(motors, robot)
     _check_fit(robot, trajectory)
-    return _instants(robot, trajectory, motors, _count(samples))[0].max()
+    return _instants(without_names(robot), trajectory, motors, _count(samples))[0].max()
 
 
 @partial(jax.jit, static_argnums=3)

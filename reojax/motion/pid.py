@@ -29,6 +29,7 @@ from reojax._internal.linalg import solve_positive
 from reojax.mechanics.dynamics import joint_inertia, joint_inertia_of_pose, joint_load
 from reojax.mechanics.integrators import RK4, runge_kutta_step
 from reojax.mechanics.kinematics import kinematics
+from reojax.mechanics.own_units import without_names
 from reojax.motion.motor import Motor, check_motors, drive, per_joint
 from reojax.motion.trajectory import Trajectory
 from reojax.robot import Robot
@@ -158,7 +159,17 @@ def track(
         raise ValueError(
             f"`sample_time` of {sample_time:g} s makes {count:.3g} samples; at most {_MOST_SAMPLES} are run."
         )
-    given = (robot, believed, trajectory, motors, gains, start, sample_time, turn, feedforward)
+    given = (
+        without_names(robot),
+        without_names(believed),
+        trajectory,
+        motors,
+        gains,
+        start,
+        sample_time,
+        turn,
+        feedforward,
+    )
     if not is_concrete(given):
         return _track(*given, int(count), int(substeps))
     with jax.debug_nans(False):  # told below

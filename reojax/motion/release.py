@@ -27,6 +27,7 @@ from reojax._internal.linalg import solve_symmetric3
 from reojax.mechanics.integrators import RK4, runge_kutta_step
 from reojax.mechanics.kinematics import kinematics
 from reojax.mechanics.momentum import momentum_matrices
+from reojax.mechanics.own_units import without_names
 from reojax.motion._resolution import (
     MOST,
     TURN,
@@ -121,8 +122,10 @@ def released(
     """
     given = _check_release(robot, trajectory, Release() if release is None else release, steps)
 
+    plain = without_names(given[0])
+
     def run(count: int) -> tuple[Released, Resolution]:
-        return _simulate_release(*given, int(steps), count)
+        return _simulate_release(plain, *given[1:], int(steps), count)
 
     if substeps is not None:
         return quietly(run, checks.whole("substeps", substeps))[0]
@@ -192,7 +195,7 @@ def release_spread(
                     f"after this release {robot.name!r} turns, or is braked, by up to {turn:.3g} rad in a piece of the "
                     f"trajectory: more than {MOST // 4} steps of {TURN} rad would be taken. Give `steps` to take them."
                 )
-    found = _spread(robot, trajectory, mean, spread, key, int(draws), int(steps))
+    found = _spread(without_names(robot), trajectory, mean, spread, key, int(draws), int(steps))
     if is_concrete(found) and not all(np.isfinite(leaf).all() for leaf in found):
         raise ValueError(f"after this release {robot.name!r} turns, or is braked, too fast for {steps} steps a piece.")
     return found

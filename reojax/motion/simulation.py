@@ -23,6 +23,7 @@ from reojax._internal.linalg import solve_symmetric3
 from reojax.mechanics.dynamics import Load, base_velocity, joint_load
 from reojax.mechanics.integrators import GAUSS, end_rotation, orientations, step_nodes
 from reojax.mechanics.momentum import momentum_matrices
+from reojax.mechanics.own_units import without_names
 from reojax.motion._resolution import (
     Resolution,
     error_by_halving,
@@ -121,8 +122,10 @@ def simulate(
     samples = checks.whole("samples", samples)
     motors = None if motors is None else check_motors(motors, robot)
 
+    plain = without_names(robot)
+
     def run(count: int) -> tuple[Motion, Resolution]:
-        return _simulate(robot, trajectory, start, motors, samples, count)
+        return _simulate(plain, trajectory, start, motors, samples, count)
 
     if substeps is not None:
         return quietly(run, checks.whole("substeps", substeps))[0]

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from reojax._internal import checks
 from reojax.collision.clearance import clearance as clearance_at, pair_name
 from reojax.collision.path_clearance import PathClearance, least_clearance
+from reojax.mechanics.own_units import without_names
 from reojax.robot import Robot
 
 _CALL = 64
@@ -37,7 +38,8 @@ class Clear(NamedTuple):
     def _look(self, paths: np.ndarray, limits: tuple[float, float, float]) -> PathClearance:
         calls = [np.arange(i, i + _CALL) for i in range(0, len(paths), _CALL)]
         with jax.enable_x64(True):
-            found = [_least(self.robot, paths[np.minimum(call, len(paths) - 1)], *limits) for call in calls]
+            robot = without_names(self.robot, shapes=True)
+            found = [_least(robot, paths[np.minimum(call, len(paths) - 1)], *limits) for call in calls]
         fields = zip(*found, strict=True)
         return PathClearance(*(np.concatenate([np.asarray(part) for part in field])[: len(paths)] for field in fields))
 

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from reojax import so3
 from reojax._internal.arrays import Array, as_numbers, common_float
 from reojax.captures.parameters import Parameter, parameter
+from reojax.mechanics.own_units import without_names
 from reojax.motion.trajectory import Trajectory
 from reojax.robot import Robot
 from reojax.steering.drift import drift_of
@@ -148,7 +149,8 @@ def Steering(
         raise ValueError(f"standard deviations must be finite and not negative; they are {std[3:].tolist()}.")
     dtype = common_float(robot, trajectory)
     one = partial(jnp.asarray, dtype=dtype)
-    robot, trajectory, h = jax.tree.map(one, (robot, trajectory, np.asarray(h, float)))
+    plain = without_names(robot, couplings=True)  # one compiled step serves all robots of this tree
+    robot, trajectory, h = jax.tree.map(one, (plain, trajectory, np.asarray(h, float)))
     table = {name: one(value) for name, value in gain_table(gains).items()} | {"momentum": h, "to_end": gains.to_end}
     table["drift"] = drift_of(robot, chosen, gains, h)
     return SteeringLaw(

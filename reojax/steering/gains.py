@@ -15,6 +15,7 @@ from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
 from reojax._internal.linalg import solve_symmetric3
 from reojax.mechanics.dynamics import base_velocity
 from reojax.mechanics.momentum import connection
+from reojax.mechanics.own_units import without_names
 from reojax.mechanics.variation import turn_per_change
 from reojax.motion.simulation import Motion
 from reojax.motion.trajectory import Trajectory
@@ -135,7 +136,7 @@ def correction_gains(
     start = np.zeros(3) if momentum is None else as_numbers("momentum", momentum)
     if start.shape != (3,) or (is_concrete(start) and not np.isfinite(start).all()):
         raise ValueError(f"`momentum` is {momentum}; it must be 3 finite numbers, in the inertial frame [kg m^2/s].")
-    return _gains(robot, motion, price, start, (window, left), int(samples))
+    return _gains(without_names(robot, couplings=True), motion, price, start, (window, left), int(samples))
 
 
 def _check(robot: Robot, motion: Path | Trajectory | Motion, samples: int, window: float, left: float) -> None:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax.mechanics.dynamics import joint_inertia
+from reojax.mechanics.own_units import without_names
 from reojax.motion.motor import Motor, check_motors, per_joint
 from reojax.robot import Robot
 from reojax.steering.asked import posture, reasonable
@@ -137,8 +138,9 @@ def _righting(robot, goals, momenta, duration, start, end, motors, clearance, we
         raise ValueError(f"`clearance` is {clearance}, but {robot.name!r} has no collision pairs.")
     known = None if motors is None else check_motors(motors, robot)
     least = None if clearance is None else np.asarray(checks.number("clearance", clearance, unit="m"))
-    task = Task(robot, None if known is None else per_joint(known, np.dtype(float)), least, first, last,
-                 price / price.mean())  # fmt: skip
+    known = None if known is None else per_joint(known, np.dtype(float))
+    plain = without_names(robot, shapes=least is not None, couplings=True)  # one program for all robots of this tree
+    task = Task(plain, known, least, first, last, price / price.mean())
     task = jax.tree.map(lambda x: jnp.asarray(x, float), task)
     look = partial(search, task, pieces=pieces, starts=starts, tolerance=tolerance, max_steps=max_steps, seed=seed)
     if duration is not None:
