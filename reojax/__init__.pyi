@@ -34,6 +34,7 @@ from reojax.motion.release import Release, Released, ReleaseSpread, release_spre
 from reojax.motion.simulation import Motion, simulate
 from reojax.motion.time_laws import Law, minimum_jerk, quintic, trapezoid
 from reojax.motion.trajectory import Trajectory, along, through
+from reojax.motion.trajectory_clearance import TrajectoryClearance, trajectory_clearance
 from reojax.path import Path, joint_travel, polygon
 from reojax.planning.free_path import FreePaths, free_path, free_paths
 from reojax.planning.plan import plan, plan_many, replan
@@ -153,6 +154,8 @@ __all__ = [
     "track",
     "Tracking",
     "Trajectory",
+    "TrajectoryClearance",
+    "trajectory_clearance",
     "trapezoid",
     "view",
     "with_motors",

@@ -128,6 +128,14 @@ def levers(structure: Structure, geometry: Geometry) -> Float[jax.Array, "p 2 m"
     return jnp.stack(rho[::-1], -1) if rho else jnp.zeros((pairs, 2, 0), geometry.axis.dtype)
 
 
+def moved_per_angle(structure: Structure, geometry: Geometry) -> Float[jax.Array, "p j"]:
+    """How far the capsules of each pair move against each other at most, for each radian of each joint [m]."""
+    joint = chains_of(structure).joint
+    pair = np.broadcast_to(np.arange(len(joint))[:, None, None], joint.shape)
+    rho = jnp.where(joint >= 0, levers(structure, geometry), 0)
+    return jnp.zeros((len(joint), geometry.axis.shape[0]), rho.dtype).at[pair, np.maximum(joint, 0)].add(rho)
+
+
 def _place(geometry: Geometry, joint: np.ndarray, link: np.ndarray) -> jax.Array:
     """Position of a joint in the frame of one of the two links that it joins."""
     return jnp.where((link == joint + 1)[..., None], 0, geometry.anchor[joint])

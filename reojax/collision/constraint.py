@@ -25,6 +25,8 @@ from reojax.robot import Robot
 _ROUND = 0.001
 """Rounding of the least of several clearances, as a share of the mean sum of a pair's radii: hardly any, so that a
 margin that rest barely has can be kept."""
+_SHARE = 0.5
+"""Share of what a pair has beyond the margin that is asked of it at most; rounding off takes some of the rest."""
 _SAMPLES = 96
 """Samples of a path by default, one an edge at least."""
 _GROUPS = 12
@@ -50,6 +52,8 @@ def clearance_shortfall(
     *,
     samples: int | None = None,
     between: float = 0.0,
+    groups: int = _GROUPS,
+    more: Float[Array, " p"] | None = None,
 ) -> Float[jax.Array, " g"]:
     """What is missing to a clearance of `margin` along a path: negative where it is kept, for an inequality.
 
@@ -64,6 +68,8 @@ def clearance_shortfall(
         between: how much more is asked for because of what lies between samples, as a multiple of the bound
             `M h^2 / 8` on how far a point leaves its chord: 2 makes a proof by `path_clearance` all but sure, at a cost
             where edges are long.
+        groups: most conditions.
+        more: (p,) clearance wanted of each pair on top of `margin` [m], without derivatives; default none.
     """
     edges = waypoints.shape[0] - 1
     samples = samples or max(1, -(-_SAMPLES // edges))
@@ -72,10 +78,19 @@ def clearance_shortfall(
     points, geometry = jnp.asarray(waypoints, dtype), unit_axes(geometry, dtype)
     if not structure.pairs:
         return jnp.zeros(0, dtype)
-    least = _least(structure, samples, between, geometry, points[:-1], points[1:])
-    groups = np.array_split(np.arange(edges), min(edges, _GROUPS))
-    rounded = [_ROUND * jax.nn.logsumexp(-least[group[0] : group[-1] + 1] / _ROUND) for group in groups]
+    further = jnp.zeros(len(structure.pairs), dtype) if more is None else jnp.asarray(more, dtype)
+    least = _least(structure, samples, between, geometry, points[:-1], points[1:], jax.lax.stop_gradient(further))
+    runs = np.array_split(np.arange(edges), min(edges, groups))
+    rounded = [_ROUND * jax.nn.logsumexp(-least[run[0] : run[-1] + 1] / _ROUND) for run in runs]
     return jnp.stack(rounded) + jnp.asarray(margin, dtype) / _size(structure, geometry)
+
+
+def with_spare(margin: float, spare: float, have: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
+    """Clearance to ask of each pair at samples [m]: some more than the margin, for what lies between them.
+
+    Of a pair that has hardly the margin where the path has to pass, no more than half of what it `have`s beyond it.
+    """
+    return margin + np.minimum(spare, _SHARE * np.maximum(have - margin, 0.0))
 
 
 def _size(structure: Structure, geometry: Geometry) -> jax.Array:
@@ -84,22 +99,29 @@ def _size(structure: Structure, geometry: Geometry) -> jax.Array:
 
 @partial(jax.custom_jvp, nondiff_argnums=(0, 1, 2))
 def _least(
-    structure: Structure, samples: int, between: float, geometry: Geometry, start: jax.Array, end: jax.Array
+    structure: Structure,
+    samples: int,
+    between: float,
+    geometry: Geometry,
+    start: jax.Array,
+    end: jax.Array,
+    more: jax.Array,
 ) -> jax.Array:
     """Least clearance at the samples of each edge (e,), rounded off over the pairs, as `clearance_shortfall` has it.
 
     Its derivative is that at the closest sample of each edge alone, found first: one posture an edge.
     """
-    return _at(structure, samples, between, geometry, start, end, _closest(structure, samples, geometry, start, end))
+    share = _closest(structure, samples, geometry, start, end, more)
+    return _at(structure, samples, between, geometry, start, end, more, share)
 
 
 @partial(_least.defjvp, symbolic_zeros=True)
 def _least_jvp(structure, samples, between, primals, tangents):
-    geometry, start, end = primals
-    share = _closest(structure, samples, geometry, start, end)
+    geometry, start, end, more = primals
+    share = _closest(structure, samples, geometry, start, end, more)
 
     def value(geometry: Geometry, start: jax.Array, end: jax.Array) -> jax.Array:
-        return _at(structure, samples, between, geometry, start, end, share)
+        return _at(structure, samples, between, geometry, start, end, more, share)
 
     least, back = jax.vjp(lambda start, end: value(geometry, start, end), start, end)
     by_start, by_end = back(jnp.ones_like(least))  # edges do not depend on each other: one pass for all
@@ -118,13 +140,13 @@ def _is_zero(tangent: object) -> bool:
 
 
 def _closest(
-    structure: Structure, samples: int, geometry: Geometry, start: jax.Array, end: jax.Array
+    structure: Structure, samples: int, geometry: Geometry, start: jax.Array, end: jax.Array, more: jax.Array
 ) -> Float[jax.Array, " e"]:
     """Where on each edge the closest sample lies, from 0 to 1."""
     share = jnp.arange(samples + 1, dtype=start.dtype) / samples
     theta = start.T[:, :, None] + (end - start).T[:, :, None] * share[None, None]
     ends = pair_ends(structure, geometry, theta.reshape(len(theta), -1))
-    gap = segment_distance(*ends) - radii(structure, geometry)[:, None]
+    gap = segment_distance(*ends) - (radii(structure, geometry) + more)[:, None]
     return share[gap.min(0).reshape(-1, samples + 1).argmin(1)]
 
 
@@ -135,11 +157,12 @@ def _at(
     geometry: Geometry,
     start: jax.Array,
     end: jax.Array,
+    more: jax.Array,
     share: Float[jax.Array, " e"],
 ) -> Float[jax.Array, " e"]:
     """Least clearance of the pairs at one place of each edge, rounded off, in units of the mean sum of two radii."""
     theta = start + (end - start) * share[:, None]
-    gap = segment_distance(*pair_ends(structure, geometry, theta.T)) - radii(structure, geometry)[:, None]
+    gap = segment_distance(*pair_ends(structure, geometry, theta.T)) - (radii(structure, geometry) + more)[:, None]
     if between:
         gap = gap - between / (8 * samples**2) * acceleration_bound(structure, geometry, (end - start).T)
     return -_ROUND * jax.nn.logsumexp(-gap / (_ROUND * _size(structure, geometry)), axis=0)

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from reojax import so3
 from reojax._internal.arrays import Array
+from reojax.collision.constraint import clearance_shortfall, with_spare
 from reojax.mechanics.dynamics import joint_load
 from reojax.mechanics.integrators import GAUSS, end_rotation
 from reojax.motion._feasibility import (
@@ -26,6 +27,7 @@ from reojax.motion.least_time import minimum_stretch
 from reojax.motion.motor import Motor, demand, no_load_speed, per_joint, stall_torque
 from reojax.motion.simulation import net_rotation_of
 from reojax.motion.trajectory import Trajectory, polynomial, stretch
+from reojax.motion.trajectory_clearance import trajectory_clearance
 from reojax.optimisation.optimise import optimise_together
 from reojax.optimisation.status import Status
 from reojax.robot import Robot
@@ -41,6 +43,8 @@ _EXACT = 1e-8
 """Largest error of an answer's net rotation that counts as converged [rad]."""
 _TOLERANCE, _SLOPE = 1e-7, 1e-5
 """Of the optimiser: largest violation (rad, and shares of the supply), and slope."""
+_AGAIN = 3
+"""How often a motion is solved whose clearance turns out to be too little between the samples."""
 _ROUNDING = 1e-12
 """What a joint may be beyond its limit by rounding [rad]."""
 
@@ -59,7 +63,10 @@ class Fastest(NamedTuple):
     converged: Bool[Array, ""]
     """Whether the optimiser says that nothing near is faster, and `error` is below 1e-8 and `beyond` zero."""
     status: Int[Array, ""]
-    """Why the optimiser ended, a `reojax.optimisation.status.Status`; `message` says it in words."""
+    """Why the optimiser ended, a `reojax.optimisation.status.Status`; `message` says it in words. `NOT_FOUND` where the
+    motion does not keep the clearance asked for."""
+    clearance: Float[Array, ""] | None = None
+    """Least distance of the robot's parts at any time, proven [m]; None if it was not asked for."""
 
     @property
     def value(self) -> Trajectory:
@@ -82,6 +89,15 @@ class Fastest(NamedTuple):
         return Status(int(self.status)).text
 
 
+class Apart(NamedTuple):
+    """A clearance that a motion must keep."""
+
+    margin: float
+    """Least distance of the robot's parts [m]."""
+    have: Float[np.ndarray, " p"]
+    """What each pair has at the postures that every motion passes [m]."""
+
+
 class Task(NamedTuple):
     """What is to be fast: a motion made of unknowns."""
 
@@ -97,6 +113,8 @@ class Task(NamedTuple):
     """Its duration."""
     order: Callable[[Array], Array]
     """Further numbers that must not be positive, linear in the unknowns."""
+    apart: Apart | None
+    """The clearance to keep, if any."""
 
 
 class UnknownBox(NamedTuple):
@@ -121,15 +139,23 @@ def least_duration(task: Task, starts: np.ndarray, box: UnknownBox, max_steps: i
         a, b, c = demand(robot, motors, theta_dot, load, soft=soft)
         return jnp.abs(a + b.sum(0) + c) / motors.supply - 1, load.omega
 
-    def sample(x: Array) -> tuple[Array, Array]:
-        """At the samples: how far motors and joints are beyond their limits; and the net rotation."""
+    def sample(x: Array) -> tuple[Array, Array, Array]:
+        """At the samples: how far motors and joints are beyond their limits; the postures; and the net rotation."""
         trajectory = task.build(x)
         length = jnp.diff(trajectory.breaks)
         state = jax.vmap(jax.vmap(polynomial, (None, 0)))(trajectory.coefficients, length[:, None] * _NODES[None])
         taken, omega = jax.vmap(jax.vmap(node))(*state)
         past = [(sign * (state.theta[:, _LOOKED, k] - place)).ravel() for sign, k, place in limited]
         rows = jnp.concatenate([taken[:, _LOOKED].ravel(), *past])
-        return rows, end_rotation(jnp.repeat(length / _SAMPLES, _SAMPLES), omega[:, 1:-1].reshape(-1, 3, 3))
+        turned = end_rotation(jnp.repeat(length / _SAMPLES, _SAMPLES), omega[:, 1:-1].reshape(-1, 3, 3))
+        return rows, state.theta[:, _LOOKED], turned
+
+    def too_near(theta: Array, wanted: Array) -> Array:
+        """What is missing to the clearance at postures (p, k, j), two conditions a piece."""
+        if task.apart is None:
+            return jnp.zeros(0)
+        points = jnp.concatenate([theta[:, :-1].reshape(-1, robot.joints), theta[-1, -1:]])
+        return clearance_shortfall(robot, points, 0.0, samples=1, groups=2 * len(theta), more=wanted)
 
     def order(x: Array) -> Array:
         return task.order(x) / box.scale[0]
@@ -138,33 +164,49 @@ def least_duration(task: Task, starts: np.ndarray, box: UnknownBox, max_steps: i
         """Rotation vector (3,) from the goal, where not all unknowns have it."""
         return jnp.zeros(0) if task.kept else so3.log(task.goal.T @ turned)
 
-    def sampled(x: Array) -> tuple[Array, Array, Array]:
+    def sampled(x: Array, wanted: Array) -> tuple[Array, Array, Array]:
         """Cost, what must be zero, and what must not be positive, as the optimiser sees them."""
-        rows, turned = sample(x)
-        return task.cost(x), rotation_error(turned), jnp.concatenate([rows, order(x)])
+        rows, theta, turned = sample(x)
+        return task.cost(x), rotation_error(turned), jnp.concatenate([rows, order(x), too_near(theta, wanted)])
 
-    def exact(x: Array, share: Array) -> Conditions:
+    def exact(x: Array, share: Array, wanted: Array) -> Conditions:
         """The conditions where the joints are farthest, without motors."""
-        beyond_rows = jnp.concatenate([beyond_limits(robot, task.build(x), share), order(x)])
-        return Conditions(rotation_error(sample(x)[1]), beyond_rows)
+        _, theta, turned = sample(x)
+        beyond_rows = [beyond_limits(robot, task.build(x), share), order(x), too_near(theta, wanted)]
+        return Conditions(rotation_error(turned), jnp.concatenate(beyond_rows))
 
     fine = jax.jit(lambda trajectory: so3.log(task.goal.T @ net_rotation_of(robot, trajectory, _FINE)))
-    found = optimise_together(
-        sampled, starts, lower=box.lower, upper=box.upper, scale=box.scale,
-        tolerance=_TOLERANCE, slope_tolerance=_SLOPE, max_steps=max_steps, progress=progress,
-    )  # fmt: skip
-    best = np.asarray(found.value[found.best], float)
-    if not task.kept or beyond(robot, build(best)) > _ROUNDING:
-        best = restore_feasibility(with_jacobian(exact), build, fine, best, (box.lower, box.upper, box.scale))
-    trajectory = build(best)
-    trajectory = stretch(trajectory, minimum_stretch(task.robot, trajectory, task.motors))
+    linearised = with_jacobian(exact)
+    spare, proven, kept = 0.0 if task.apart is None else 0.02 * task.apart.margin + 1e-4, None, True
+    for _ in range(1 if task.apart is None else _AGAIN):
+        wanted = np.zeros(0) if task.apart is None else with_spare(task.apart.margin, spare, task.apart.have)
+        found = optimise_together(
+            sampled, starts, lower=box.lower, upper=box.upper, scale=box.scale, data=np.tile(wanted, (len(starts), 1)),
+            tolerance=_TOLERANCE, slope_tolerance=_SLOPE, max_steps=max_steps, progress=progress,
+        )  # fmt: skip
+        best = np.asarray(found.value[found.best], float)
+        if not task.kept or beyond(robot, build(best)) > _ROUNDING:
+            conditions = lambda x, share, wanted=wanted: linearised(x, share, wanted)
+            best = restore_feasibility(conditions, build, fine, best, (box.lower, box.upper, box.scale))
+        trajectory = build(best)
+        trajectory = stretch(trajectory, minimum_stretch(task.robot, trajectory, task.motors))
+        if task.apart is not None:
+            proven = trajectory_clearance(task.robot, trajectory).distance
+            kept = float(proven) >= task.apart.margin
+            if kept:
+                break
+            # what came too near between the samples, with more asked for at them
+            spare = 2 * spare + task.apart.margin - float(proven)
+            starts = best[None]
     error, past = jnp.linalg.norm(fine(trajectory)), beyond(robot, trajectory)
     past = past if past > _ROUNDING else 0.0  # a corner of a path may lie on a limit
+    good = bool(found.converged[found.best]) and past == 0 and float(error) < _EXACT and kept
     return Fastest(
         trajectory=trajectory,
         duration=trajectory.duration,
         error=error,
         beyond=jnp.asarray(past),
-        converged=jnp.asarray(bool(found.converged[found.best]) and past == 0 and float(error) < _EXACT),
-        status=jnp.asarray(found.status[found.best]),
+        converged=jnp.asarray(good),
+        status=jnp.asarray(found.status[found.best] if kept else Status.NOT_FOUND),
+        clearance=proven,
     )

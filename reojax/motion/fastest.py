@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
+from reojax.collision.refusal import check_clearance
 from reojax.mechanics.holonomy import net_rotation
-from reojax.motion._optimal_control import Fastest as Fastest, Task, UnknownBox, least_duration
+from reojax.motion._optimal_control import Apart, Fastest as Fastest, Task, UnknownBox, least_duration
 from reojax.motion.least_time import minimum_time
 from reojax.motion.motor import Motor, check_motors
 from reojax.motion.time_laws import Law, check_law, quintic, trapezoid
@@ -29,6 +30,7 @@ def overlap(
     motors: Motor | Sequence[Motor],
     law: Law | str | None = None,
     *,
+    clearance: float | None = None,
     max_steps: int = 100,
     progress: str | None = None,
 ) -> Fastest:
@@ -42,17 +44,20 @@ def overlap(
         path: the path in shape space, with numbers that can be read: not under `jit`.
         motors: motors of the joints, one for all or one for each.
         law: the time law of every move, or its name; default `quintic()`.
+        clearance: least distance between the robot's parts, from 0 up, that is proven to be kept at all times [m];
+            default not asked. Both ends of the path must have it.
         max_steps: most steps of the optimiser.
         progress: what to write before a bar on stderr; default no bar.
 
     Raises:
-        ValueError: as `minimum_time`, and for a path that stays where it is.
+        ValueError: as `minimum_time`, for a path that stays where it is, and for ends that do not have the clearance.
     """
     law = quintic() if law is None else check_law(law)
     checks.whole("max_steps", max_steps)
     _check_moves(path)
     least = minimum_time(robot, path, motors, law)
     corners = np.asarray(path.waypoints, float)
+    apart = _apart(robot, clearance, {"the start of the path": corners[0], "the end of the path": corners[-1]})
     moves = tuple((int(e), int(k)) for e, k in np.argwhere(np.diff(corners, axis=0) != 0))
     edge = np.array(moves)[:, 0]
     durations = np.asarray(least.durations, float)
@@ -78,7 +83,7 @@ def overlap(
     low[-1] = 0.2 * total
     scale = np.concatenate([np.full(2 * count, 0.2 * total), np.full(joints, 0.3), [total]])
     goal = net_rotation(robot, path)
-    task = Task(robot, check_motors(motors, robot), goal, False, build, lambda x: x[-1], order)
+    task = Task(robot, check_motors(motors, robot), goal, False, build, lambda x: x[-1], order, apart)
     return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
 
@@ -88,6 +93,7 @@ def free_law(
     motors: Motor | Sequence[Motor],
     *,
     points: int = 5,
+    clearance: float | None = None,
     max_steps: int = 100,
     progress: str | None = None,
 ) -> Fastest:
@@ -100,6 +106,8 @@ def free_law(
         path: the path in shape space, with numbers that can be read: not under `jit`.
         motors: motors of the joints, one for all or one for each.
         points: free points of each edge's law, 1 or more.
+        clearance: least distance between the robot's parts, from 0 up, that is proven to be kept at all times [m];
+            default not asked. The path must have it.
         max_steps: most steps of the optimiser.
         progress: what to write before a bar on stderr; default no bar.
 
@@ -109,7 +117,9 @@ def free_law(
     checks.whole("points", points)
     checks.whole("max_steps", max_steps)
     _check_moves(path)
-    least = minimum_time(robot, path, motors, trapezoid())
+    least = minimum_time(robot, path, motors, trapezoid(), clearance=clearance)
+    have = np.full(len(robot.collision_pairs), np.inf if least.clearance is None else float(least.clearance))
+    apart = None if clearance is None else Apart(float(clearance), have)  # every law passes the whole path
     edges = path.edges
     corners = np.asarray(path.waypoints, float)
     edge = along(Path(np.array([[0.0], [1.0]])), trapezoid(), np.ones(1))
@@ -118,7 +128,7 @@ def free_law(
     def build(x: Array) -> Trajectory:
         inner = jnp.concatenate([jnp.zeros((edges, 1)), x[edges:].reshape(edges, points), jnp.ones((edges, 1))], 1)
         parts = [
-            through(Path(corners[e] + inner[e][:, None] * (corners[e + 1] - corners[e])[None]), x[e] / (points + 1))
+            through(Path(corners[e][None] + inner[e][:, None] * (corners[e + 1] - corners[e])[None]), x[e] / (points + 1))
             for e in range(edges)
         ]
         return join(parts)
@@ -129,7 +139,8 @@ def free_law(
     high = np.concatenate([3 * durations, np.full(edges * points, 1.2)])
     scale = np.concatenate([0.5 * durations, np.full(edges * points, 0.3)])
     cost = lambda x: x[:edges].sum()
-    task = Task(robot, check_motors(motors, robot), net_rotation(robot, path), True, build, cost, lambda x: x[:0])
+    goal = net_rotation(robot, path)
+    task = Task(robot, check_motors(motors, robot), goal, True, build, cost, lambda x: x[:0], apart)
     return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
 
@@ -142,6 +153,7 @@ def fastest_loop(
     knots: int = 10,
     starts: int = 3,
     seed: int = 0,
+    clearance: float | None = None,
     max_steps: int = 200,
     progress: str | None = None,
 ) -> Fastest:
@@ -155,6 +167,8 @@ def fastest_loop(
         knots: intervals of the spline, 3 or more.
         starts: how many starts.
         seed: seed of the starts.
+        clearance: least distance between the robot's parts, from 0 up, that is proven to be kept at all times [m];
+            default not asked. The posture where `near` begins must have it.
         max_steps: most steps of the optimiser.
         progress: what to write before a bar on stderr; default no bar.
 
@@ -172,6 +186,7 @@ def fastest_loop(
         raise ValueError("`near` does not end where it begins; it must be a closed path.")
     motors = check_motors(motors, robot)
     least = minimum_time(robot, near, motors)
+    apart = _apart(robot, clearance, {"the start of `near`": np.asarray(near.waypoints[0], float)})
     law, joints = quintic(), robot.joints
     begun = along(near, law, np.asarray(least.durations))
     total = 1.2 * float(least.duration)
@@ -189,8 +204,15 @@ def fastest_loop(
     low = np.concatenate([np.full(knots, 0.1 * total / knots), np.tile(np.asarray(robot.lower, float), knots - 1)])
     high = np.concatenate([np.full(knots, 3 * total / knots), np.tile(np.asarray(robot.upper, float), knots - 1)])
     scale = np.concatenate([np.full(knots, total / knots), np.tile(0.3 * reach, knots - 1)])
-    task = Task(robot, motors, goal, False, build, lambda x: x[:knots].sum(), lambda x: x[:0])
+    task = Task(robot, motors, goal, False, build, lambda x: x[:knots].sum(), lambda x: x[:0], apart)
     return least_duration(task, np.clip(first, low, high), UnknownBox(low, high, scale), max_steps, progress)
+
+
+def _apart(robot: Robot, margin: float | None, postures: dict[str, np.ndarray]) -> Apart | None:
+    """The clearance to keep, if one is asked for, and what the postures have that every motion passes."""
+    if margin is None:
+        return None
+    return Apart(*check_clearance(robot, margin, postures))
 
 
 def _check_moves(path: Path, entry: str = "path") -> None:

@@ -51,6 +51,8 @@ class LeastTime(NamedTuple):
     """When in the edge, as a share of its duration."""
     needs: Float[Array, "e j"]
     """Least duration that each joint's motor alone would allow [s]."""
+    clearance: Array | None = None
+    """Least distance of the robot's parts along the path, proven [m]; None if it was not asked for."""
 
 
 def minimum_time(
@@ -82,8 +84,7 @@ def minimum_time(
     """
     checks.instance("robot", robot, Robot, "`make_robot` makes")
     motors = _able(motors, robot)
-    if clearance is not None:
-        require_clearance(robot, path, clearance)
+    proven = None if clearance is None else require_clearance(robot, path, clearance).distance
     law = check_law(law)
     trajectory = along(path, law, 1.0)
     _check_fit(robot, trajectory)
@@ -99,6 +100,7 @@ def minimum_time(
         joint=worst % robot.joints,
         place=jnp.take_along_axis(share, (worst // robot.joints)[:, None], axis=1)[:, 0],
         needs=needs.max(axis=1),
+        clearance=proven,
     )
 
 

@@ -1,4 +1,4 @@
-"""Paths that must stay clear of the robot itself: which of many do, proven, and the postures that they start from."""
+"""Paths that must stay clear of the robot itself: which of many do, proven."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._internal import checks
-from reojax.collision.clearance import clearance as clearance_at, pair_name
+from reojax.collision.constraint import with_spare
 from reojax.collision.path_clearance import PathClearance, least_clearance
 from reojax.mechanics.own_units import without_names
 from reojax.robot import Robot
@@ -25,6 +24,8 @@ class Clear(NamedTuple):
 
     robot: Robot
     margin: float
+    have: Float[np.ndarray, " p"]
+    """What each pair has at the postures that every path passes [m]."""
 
     def proven(self, paths: Float[np.ndarray, "m v j"], tolerance: float = 1e-4) -> Float[np.ndarray, " m"]:
         """Proven least clearance of each path, within `tolerance` of the true least [m]."""
@@ -34,6 +35,10 @@ class Clear(NamedTuple):
         """Which paths (m,) are proven to keep the margin; quicker than `proven`."""
         found = self._look(paths, (0.02 * self.margin + 1e-5, self.margin, self.margin))
         return np.asarray(found.distance, float) >= self.margin
+
+    def with_spare(self, spare: float) -> Float[np.ndarray, " p"]:
+        """Clearance to ask of each pair at samples [m], up to `spare` more than the margin."""
+        return with_spare(self.margin, spare, self.have)
 
     def _look(self, paths: np.ndarray, limits: tuple[float, float, float]) -> PathClearance:
         calls = [np.arange(i, i + _CALL) for i in range(0, len(paths), _CALL)]
@@ -47,28 +52,3 @@ class Clear(NamedTuple):
 @jax.jit
 def _least(robot: Robot, paths: jax.Array, *limits: ArrayLike) -> PathClearance:
     return jax.vmap(partial(least_clearance, robot), (0, None, None, None))(paths, *limits)
-
-
-def check_clearance(robot: Robot, margin: ArrayLike, postures: dict[str, np.ndarray]) -> float:
-    """Return the clearance asked for, if the robot can have it at the postures where its paths have to be.
-
-    Raises:
-        ValueError: naming the pair, if the margin is no number from 0 up, the robot has no pairs, or a posture has not
-            that much clearance or is in contact already.
-    """
-    wanted = checks.number("clearance", margin, unit="m", least=0.0)
-    if not robot.collision_pairs:
-        raise ValueError(
-            f"`clearance` is {wanted:g} m, but {robot.name!r} has no pairs of shapes to keep apart: give it `capsules`."
-        )
-    for name, theta in postures.items():
-        here = np.asarray(clearance_at(robot, theta), float)
-        worst = int(here.argmin())
-        pair = pair_name(robot, worst)
-        if here[worst] < 0:
-            raise ValueError(f"{name} is in contact: {pair} overlap by {-here[worst]:.6g} m.")
-        if here[worst] < wanted:
-            raise ValueError(
-                f"`clearance` is {wanted:g} m, which {name} does not have: {pair} are {here[worst]:.6g} m apart."
-            )
-    return wanted

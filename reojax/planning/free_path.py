@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
+from reojax.collision.refusal import check_clearance
 from reojax.manoeuvres import Layout, fold_angles
 from reojax.planning import quaternions
 from reojax.planning.checks import a_robot, key_of, robot_and_layout
-from reojax.planning.clear_paths import Clear, check_clearance
+from reojax.planning.clear_paths import Clear
 from reojax.planning.free_polygons import polygons_of
 from reojax.planning.free_search import Search, apart
 from reojax.planning.freedom import Freedom, freedom_of
@@ -196,7 +197,7 @@ def free_paths(
         clear = None
         if clearance is not None:
             postures = {"the posture at the start": freedom.start, "the posture at the end": freedom.end}
-            clear = Clear(robot, check_clearance(robot, clearance, postures))
+            clear = Clear(robot, *check_clearance(robot, clearance, postures))
         options = (repeats, corners, starts, tolerance, max_steps, seed, progress, clear)
         return _solve(robot, given, freedom, before, *options)
 

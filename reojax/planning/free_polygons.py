@@ -55,8 +55,8 @@ class Aim(NamedTuple):
     """1 where travel is made least."""
     far: Float[Array, ""]
     """1 where `turn` is made largest. Where both are 0 only the target counts."""
-    margin: Float[Array, ""]
-    """Clearance to keep [m]; of no effect where none is asked for."""
+    margin: Float[Array, " p"]
+    """Clearance that each pair is to keep [m]; of no effect where none is asked for."""
 
 
 class Polygons(NamedTuple):
@@ -120,7 +120,7 @@ def _polygons_of(robot: Robot, joints: tuple[int, ...], moves: np.ndarray, corne
         return so3.log(target.T @ net_rotation(robot, Path(points(x, aim)), steps=COARSE))
 
     def too_near(x: Array, aim: Aim) -> Array:
-        return clearance_shortfall(robot, points(x, aim), aim.margin, samples=_SAMPLES)
+        return clearance_shortfall(robot, points(x, aim), 0.0, samples=_SAMPLES, more=aim.margin)
 
     def turned(paths: Array, steps: int) -> Array:
         return jax.vmap(lambda path: net_rotation(robot, Path(path), steps=steps))(paths)

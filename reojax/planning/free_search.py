@@ -145,7 +145,7 @@ class Search:
                     rounding=np.full(rows, (rounding or 1.0) * self._fine),
                     short=np.full(rows, float(rounding is not None and not turning)),
                     far=np.full(rows, float(turning)),
-                    margin=np.full(rows, 0.0 if self.clear is None else self.clear.margin + self.spare),
+                    margin=np.tile(np.zeros(0) if self.clear is None else self.clear.with_spare(self.spare), (rows, 1)),
                 ),
                 tolerance=exact,
                 slope_tolerance=slope,

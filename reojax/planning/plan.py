@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
+from reojax.collision.refusal import check_clearance
 from reojax.manoeuvres import Layout, fold_angles
 from reojax.mechanics.controllable import controllable_directions
 from reojax.planning import quaternions
 from reojax.planning.candidates import Context, context, join
 from reojax.planning.checks import OBJECTIVES, key_of, robot_and_layout
 from reojax.planning.clear_boxes import clear_boxes
-from reojax.planning.clear_paths import Clear, check_clearance
+from reojax.planning.clear_paths import Clear
 from reojax.planning.fewest import Answer, cheapest, fewest, rotation_from_folded
 from reojax.planning.reach import Reach
 from reojax.planning.result import Plan, first_of, plans
@@ -118,7 +119,7 @@ def plan_many(
         if clearance is not None:
             rest = fold_angles(layout)
             postures = {"the posture at rest": 0 * rest} | ({"the folded posture": rest} if layout.fold else {})
-            clear = Clear(robot, check_clearance(robot, clearance, postures))
+            clear = Clear(robot, *check_clearance(robot, clearance, postures))
         with _bar(wanted.shape[1], progress) as bar:
             found = _solve(
                 _scene(robot, layout, letters, twist_limit, bend_limit, clear), wanted, search, most, tolerance, bar
@@ -225,7 +226,7 @@ def _scene(
     def make() -> Context:
         box = box_of(robot, layout, letters, twist_limit, bend_limit)
         if clear is not None:
-            box = clear_boxes(layout, box, clear._replace(margin=clear.margin + _SPARE))
+            box = clear_boxes(layout, box, clear._replace(margin=float(clear.with_spare(_SPARE).min())))
         return context(robot, layout, box)
 
     key = key_of(robot), layout, letters, twist_limit, bend_limit

@@ -26,6 +26,7 @@ from reojax.captures.parameters import Parameter, parameter
 from reojax.mechanics.own_units import without_names
 from reojax.motion.trajectory import Trajectory
 from reojax.robot import Robot
+from reojax.steering.clear_of_itself import Keep, keep_of, towards
 from reojax.steering.drift import drift_of
 from reojax.steering.estimator import Estimate, Model, along, changed, corrected, off
 from reojax.steering.gains import correction_gains
@@ -36,7 +37,7 @@ from reojax.steering.tables import gain_table
 
 @partial(
     jax.tree_util.register_dataclass,
-    data_fields=["model", "table", "start_covariance", "tau", "settle", "largest"],
+    data_fields=["model", "table", "start_covariance", "tau", "settle", "largest", "keep"],
     meta_fields=[],
 )
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -49,6 +50,8 @@ class SteeringLaw:
     tau: Array
     settle: Array
     largest: Array
+    keep: Keep | None
+    """The clearance that corrections keep, if one was asked for; `keep.proven` is that of the motion."""
 
     def start(self) -> SteeringState:
         """State at the release: the robot as planned, at rest, oriented as the inertial frame."""
@@ -101,6 +104,7 @@ def Steering(
     samples: int = 32,
     weights: ArrayLike | None = None,
     left: float = 1.0,
+    clearance: float | None = None,
 ) -> SteeringLaw:
     """Estimator and corrector of one motion: readings in, joint angles out, all state explicit.
 
@@ -122,6 +126,9 @@ def Steering(
         samples: of each piece of the trajectory, for the tables.
         weights: (j,) price of changing each joint, as for `correction_gains`.
         left: as for `correction_gains`.
+        clearance: least distance between the robot's parts, from 0 up, that every posture which the joints are told is
+            proven to keep [m]; default not asked. The motion must keep it. A correction that would come nearer goes
+            only part of its way, and what it leaves is corrected later, if there is time.
 
     Raises:
         ValueError: naming the entry, its value and the rule.
@@ -147,6 +154,7 @@ def Steering(
     std = np.concatenate([np.zeros(3), spread, [drag_std], np.asarray(parameters_std, float)])
     if not (np.isfinite(std) & (std >= 0)).all():
         raise ValueError(f"standard deviations must be finite and not negative; they are {std[3:].tolist()}.")
+    keep = None if clearance is None else keep_of(robot, trajectory, clearance)
     dtype = common_float(robot, trajectory)
     one = partial(jnp.asarray, dtype=dtype)
     plain = without_names(robot, couplings=True)  # one compiled step serves all robots of this tree
@@ -160,6 +168,7 @@ def Steering(
         tau=one(tau),
         settle=one(settle),
         largest=one(largest),
+        keep=keep,
     )
 
 
@@ -170,7 +179,7 @@ def _update(law: SteeringLaw, state: SteeringState, reading: Reading) -> tuple[S
     planned = law.model.trajectory.at(time).theta
     # a joint that is not read is taken to be where it is told to be
     row = row_at(law.table, time)
-    own = planned - row["direction"] @ state.filtered
+    own = _told(law, planned, row["direction"] @ state.filtered)
     offset = jnp.where(jnp.isfinite(theta), theta, own) - planned
     times = jnp.concatenate([state.past_time[1:], time[None]])
     offsets = jnp.concatenate([state.past_offset[1:], offset[None]])
@@ -193,7 +202,7 @@ def _update(law: SteeringLaw, state: SteeringState, reading: Reading) -> tuple[S
         row, law.table, time, state.steer, state.filtered, state.rate, error, worth, law.tau, law.largest
     )
     filtered, rate = smooth(steer, state.filtered, state.rate, time - state.time, law.tau)
-    told = jnp.clip(planned - row["direction"] @ filtered, law.model.robot.lower, law.model.robot.upper)
+    told = _told(law, planned, row["direction"] @ filtered)
     state = SteeringState(
         time=time,
         taken=until,
@@ -209,3 +218,10 @@ def _update(law: SteeringLaw, state: SteeringState, reading: Reading) -> tuple[S
         rate=rate,
     )
     return state, References(told, error, left)
+
+
+def _told(law: SteeringLaw, planned: Array, back: Array) -> Array:
+    """Where the joints go: the planned posture less a correction, within the limits, and clear if that is asked."""
+    robot = law.model.robot
+    wanted = jnp.clip(planned - back, robot.lower, robot.upper)
+    return wanted if law.keep is None else towards(robot, law.keep, planned, wanted)

@@ -78,7 +78,10 @@ def test_boxes_hold_only_clear_loops():
     from reojax.planning.words import box_of, last_twist, loop_corners
 
     with jax.enable_x64(True):
-        layout, clear = reojax.layout_of(PROTOTYPE), Clear(PROTOTYPE, 0.005)
+        layout, clear = (
+            reojax.layout_of(PROTOTYPE),
+            Clear(PROTOTYPE, 0.005, np.asarray(reojax.clearance(PROTOTYPE, np.zeros(3)))),
+        )
         whole = box_of(PROTOTYPE, layout, "AB", *BOX.values())
         boxes = clear_boxes(layout, whole, clear)
         rng = np.random.default_rng(0)
