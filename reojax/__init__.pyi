@@ -7,6 +7,7 @@ from reojax.captures.capture import Capture, make_capture, read_capture
 from reojax.captures.comparison import Comparison, Sampled, compare, joints_simulated
 from reojax.captures.parameters import Parameter
 from reojax.collision.clearance import clearance
+from reojax.collision.nearest import Nearest, nearest_parts
 from reojax.collision.path_clearance import PathClearance, path_clearance
 from reojax.files.trajectories import write_trajectory
 from reojax.manoeuvres import FOUR_BODY, SIX_BODY, Layout, manoeuvre_a, manoeuvre_b
@@ -110,6 +111,8 @@ __all__ = [
     "MomentumMatrices",
     "Motion",
     "Motor",
+    "Nearest",
+    "nearest_parts",
     "net_rotation",
     "no_load_speed",
     "overlap",

@@ -29,4 +29,5 @@ def write_page(args: argparse.Namespace, robot: "Robot", motion: Any, *, title: 
     from reojax.viewer import view
 
     if args.html is not None:
-        view(robot, motion, args.html, title=title, target=target)
+        asked = getattr(args, "clearance", None) is not None
+        view(robot, motion, args.html, title=title, target=target, clearance=asked or None)

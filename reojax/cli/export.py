@@ -3,9 +3,11 @@
 import argparse
 import json
 import math
+import sys
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput, version
+from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
 from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_manoeuvre, robot_and_path
 from reojax.cli._planned import add_timing, plan_motion
@@ -23,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_timing(parser)
     add("--rate", type=_positive, default=200.0, metavar="HZ", help="points per second, about [%(default)g]")
     add("--delay", type=_delay, default=0.0, metavar="S", help="time before the first point [%(default)g]")
+    add_clearance(parser, "proven along the whole path, or nothing is written and exit 1")
     add("--torques", action="store_true", help="write the joint torques in free fall too")
     add("--json", action="store_true", help="print one JSON object")
 
@@ -35,11 +38,18 @@ def run(args: argparse.Namespace) -> None:
     session.start()
     try:
         check_trajectory(args.file)
-        report = _write(*robot_and_path(args), args)
+        robot, path = robot_and_path(args)
+        clear = clearance_report(robot, path, args)
+        if clear is not None and not clear["kept"]:
+            print("\n".join(clearance_text(clear)[1:] + ["nothing is written"]), file=sys.stderr)
+            sys.exit(1)
+        report = _write(robot, path, args) | {"clearance": clear}
     except ValueError as error:
         raise BadInput(f"reojax export: {error}") from error
     lines = [f"{report['points']} points in {report['duration_s']:.6g} s, written to {args.file}"]
     lines += limits_text(args.robot, report["joints_beyond_limits"])
+    if clear is not None:
+        lines += clearance_text(clear)
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else "\n".join(lines))
 
 

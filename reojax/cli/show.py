@@ -42,6 +42,7 @@ def run(args: argparse.Namespace) -> None:
 
             save_robot(robot, args.save)
         report = _report(robot, args) | ({} if plan is None else {"plan": _plan_report(plan)})
+        report["clearance"] = _clearance(robot, plan)
     except ValueError as error:
         raise BadInput(f"reojax show: {error}") from error
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(robot, report))
@@ -67,6 +68,27 @@ def _plan_report(plan: "SavedPlan") -> dict[str, Any]:
         "runs": int(plan.repeats),
         "travel_deg": float(np.rad2deg(plan.travel)),
         "error_rad": float(plan.error),
+    }
+
+
+def _clearance(robot: "Robot", plan: "SavedPlan | None") -> dict[str, Any] | None:
+    """Where the parts are nearest to each other: along a plan, or with all joints at zero; None without pairs."""
+    import numpy as np
+
+    from reojax.collision.nearest import nearest_parts
+    from reojax.path import polygon
+
+    if not robot.collision_pairs:
+        return None
+    found = nearest_parts(robot, polygon(np.zeros((1, robot.joints))) if plan is None else plan.path)
+    return {
+        "of": "robot" if plan is None else "plan",
+        "proven_m": found.distance,
+        "found_m": found.found,
+        "pair": found.name,
+        "at_edge": found.at,
+        "theta_rad": found.theta.tolist(),
+        "nearest_points_m": found.points.tolist(),
     }
 
 
@@ -185,6 +207,18 @@ def _text(robot: "Robot", report: dict[str, Any]) -> str:
         runs = f", run {plan['runs']} times" if plan["runs"] > 1 else ""
         travel, error = plan["travel_deg"], plan["error_rad"]
         lines += ["", f"plan: {plan['corners']} corners{runs}, {travel:.1f} deg of joint travel, {error:.1e} rad off"]
+    if report["clearance"] is None:
+        lines += ["", "clearance: none, as there are no pairs of shapes to keep apart"]
+    else:
+        lines += ["", _clearance_text(report["clearance"])]
     if report["saved"] is not None:
         lines += ["", f"robot in {report['saved']}"]
     return "\n".join(lines)
+
+
+def _clearance_text(found: dict[str, Any]) -> str:
+    gap = 1e3 * found["found_m"]
+    how = f"parts overlap by {-gap:.3f} mm" if gap < 0 else f"{1e3 * found['proven_m']:.3f} mm"
+    place = "joints at zero" if found["of"] == "robot" else f"{found['at_edge']:.3f} edges along the plan"
+    points = " and ".join("(" + ", ".join(f"{1e3 * x:.1f}" for x in point) + ")" for point in found["nearest_points_m"])
+    return f"clearance: least {how}, between {found['pair']}, {place}; nearest points {points} mm, base frame"

@@ -85,7 +85,12 @@ def _draw(robot: "Robot", path: "Path", history: Any, motion: "Motion | None", a
     title = _title(args)
     if motion is None:
         figure = plot.history_figure(
-            robot, path, title=title, edge_names=edge_names(robot, path, args), rotations=history
+            robot,
+            path,
+            title=title,
+            edge_names=edge_names(robot, path, args),
+            rotations=history,
+            clearance=args.clearance is not None,
         )
     else:
         figure = plot.motion_figure(robot, motion, title=f"{title}, {args.law or LAW}")

@@ -1,10 +1,12 @@
 """Show a turn in a browser: a manoeuvre or a plan as one HTML file, or the robot live with sliders (`--live`)."""
 
 import argparse
+import sys
 from pathlib import Path as File
 from typing import TYPE_CHECKING, Any
 
 from reojax.cli._arguments import BadInput
+from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
 from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_manoeuvre, heading, path_of
 from reojax.cli._motors import seconds
@@ -25,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_manoeuvre(parser, plan=False)
     add("--duration", type=seconds, metavar="S", help="run it in this time, by a quintic law")
     add("--beside", metavar="PLAN.json", help="another plan for the same robot, shown beside it")
+    add_clearance(parser, "proven along the whole path and marked where it is least, or exit 1")
     add("--title", metavar="TEXT", help="headline of the page")
     add("--out", metavar="PAGE.html", help="where to write the page [turn.html]")
     add(
@@ -45,20 +48,24 @@ def run(args: argparse.Namespace) -> None:
         if args.live:
             if args.out is not None or args.plan is not None or args.beside is not None:
                 raise ValueError("argument --live: it shows the robot alone, without PLAN.json, --beside or --out")
+            if args.clearance is not None:
+                raise ValueError("argument --clearance: --live has no path to look along")
             _serve(robot_of(args.robot), args.port)
             return
         out = args.out or "turn.html"
         check_ending(out, "page", ("html", "htm"))
-        written, note = _write(args, out)
+        written, note, kept = _write(args, out)
     except ValueError as error:
         raise BadInput(f"reojax view: {error}") from error
     print(f"page in {written} ({written.stat().st_size / 1e3:.0f} kB); open it in a browser, it needs no network")
     if note:
         print("\n".join(note))
+    if not kept:
+        sys.exit(1)
 
 
-def _write(args: argparse.Namespace, out: str) -> tuple[File, list[str]]:
-    """Write the page; return where it is, and the joint limits that are exceeded, in lines."""
+def _write(args: argparse.Namespace, out: str) -> tuple[File, list[str], bool]:
+    """Write the page; return where it is, limits exceeded and the clearance in lines, and whether that is kept."""
     import numpy as np
 
     from reojax.motion.simulation import simulate
@@ -76,6 +83,8 @@ def _write(args: argparse.Namespace, out: str) -> tuple[File, list[str]]:
         shown.append(_path(robot, other, args.beside))
         names.append(str(other["config"].get("target", args.beside)))
     note = limits_text(name, joints_beyond_limits(robot, shown))
+    found = [clearance_report(robot, path, args) for path in shown]
+    note += [line for report in found if report is not None for line in clearance_text(report)]
     if args.duration is not None:
         for k, path in enumerate(shown):
             angles = np.abs(np.diff(path.waypoints, axis=0)).max(axis=1)
@@ -92,9 +101,10 @@ def _write(args: argparse.Namespace, out: str) -> tuple[File, list[str]]:
         target=None if plan is None else np.asarray(plan["target_matrix"], float),
         beside=shown[1] if len(shown) > 1 else None,
         names=names,
+        clearance=args.clearance is not None,
         title=args.title or names[0] if plan is None else args.title or f"Plan for {names[0]} on {name}",
     )
-    return written, note
+    return written, note, all(report is None or report["kept"] for report in found)
 
 
 def _title(args: argparse.Namespace) -> str:

@@ -10,13 +10,10 @@ from reojax import so3
 from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax._internal.checks import numbers
-from reojax.collision.constraint import clearance_shortfall
+from reojax.design.self_clearance import ClearBy
 from reojax.design.loops import Loops
 from reojax.design.problem import Measure, Outcome
 from reojax.path import joint_travel
-
-_BETWEEN = 2.0
-"""Clearance kept in hand for what lies between samples: for leaving the chord, and for normals that turn."""
 
 
 def turned_to(target: ArrayLike | str) -> Measure:
@@ -110,8 +107,9 @@ def loop_area(outcome: Outcome) -> Array:
 def clear_by(margin: float, *, samples: int | None = None) -> Measure:
     """Whether the robot stays clear of itself by `margin` along the whole loop, for an inequality.
 
-    The clearance of all pairs at samples, and as much more as a point of a capsule may come nearer between them. What
-    an answer keeps is proven by `Outcome.clearance`.
+    The clearance of all pairs at samples, and as much more as a point of a capsule may come nearer between them. Then
+    `Problem.solve` proves its answers along the whole loop: what falls short is solved again with more asked for at the
+    samples, and is not `converged` if it still does. `Outcome.clearance` has what an answer keeps.
 
     Args:
         margin: least distance between any two parts of the robot [m].
@@ -121,12 +119,7 @@ def clear_by(margin: float, *, samples: int | None = None) -> Measure:
         ValueError: if the margin is not one finite number, or `samples` not a positive integer.
     """
     wanted = checks.number("margin", margin, unit="m")
-    per_edge = None if samples is None else checks.whole("samples", samples)
-
-    def measure(outcome: Outcome) -> Array:
-        return clearance_shortfall(outcome.robot, outcome.path.waypoints, wanted, samples=per_edge, between=_BETWEEN)
-
-    return measure
+    return ClearBy(wanted, None if samples is None else checks.whole("samples", samples))
 
 
 def bend_within(joint: int | str, name: str) -> Measure:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers
 from reojax.collision.path_clearance import PathClearance, path_clearance
+from reojax.design.self_clearance import TIGHTENED, ClearBy, prove
 from reojax.design.loops import Loops
 from reojax.design.variables import Space, Variable
 from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation
@@ -120,7 +122,13 @@ class Problem:
         self.cost = cost
         # measures and the loops' own conditions apart: the latter are cheap, and need no derivative of the rotation
         self._equality = self._measured(equality), self._conditions("equality")
-        self._inequality = self._measured(inequality), self._conditions("inequality")
+        self._clear = tuple(measure for measure in inequality if isinstance(measure, ClearBy))
+        levels = range(TIGHTENED + 1 if self._clear else 1)
+        tightened = [[m.tighter(k) if isinstance(m, ClearBy) else m for m in inequality] for k in levels]
+        last = self._conditions("inequality")
+        self._inequalities = [(self._measured(measures), last) for measures in tightened]
+        self._inequality = self._inequalities[0]
+        self._least = jax.jit(jax.vmap(lambda x: self.outcome(x).clearance.distance))
 
     def _measured(self, measures: Sequence[Measure]) -> Vector:
         def function(x: Array) -> Array:
@@ -279,16 +287,25 @@ class Problem:
             for array in (x, lower, upper):
                 array[:, place] = np.where(fixed, part, array[:, place])
         size = np.where(self.space.upper > self.space.lower, self.space.upper - self.space.lower, 1.0)
-        return optimise(
-            self.cost,
-            x,
-            lower=lower,
-            upper=upper,
-            equality=self._equality,
-            inequality=self._inequality,
-            scale=size,
-            **limits._asdict(),
-        )
+
+        def run(x: np.ndarray, rows: np.ndarray, level: int) -> Solution:
+            return optimise(
+                self.cost,
+                x,
+                lower=lower[rows],
+                upper=upper[rows],
+                equality=self._equality,
+                inequality=self._inequalities[level],
+                scale=size,
+                **limits._asdict(),
+            )
+
+        found = run(x, np.arange(len(x)), 0)
+        return prove(found, run, self._kept) if self._clear else found
+
+    def _kept(self, x: Float[np.ndarray, "m n"]) -> Bool[np.ndarray, " m"]:
+        """Which designs are proven to keep their clearance along their whole loops."""
+        return np.asarray(self._least(x)) >= max(measure.margin for measure in self._clear)
 
 
 def _concatenate(x: Array, parts: Sequence[Any]) -> Array:

@@ -45,11 +45,11 @@ class Linearised(NamedTuple):
     inequality_jacobian: Float[Array, "q n"]
 
 
-def with_jacobian(function: Callable[[Any, Any], Conditions]) -> Callable[[Any, Any], Linearised]:
-    """Conditions of the unknowns (n,) and of shares of the pieces (2, p, j), with derivatives by the unknowns."""
+def with_jacobian(function: Callable[..., Conditions]) -> Callable[..., Linearised]:
+    """Conditions of the unknowns (n,) and of anything more, with derivatives by the unknowns."""
 
-    def both(x: Array, share: Array) -> Linearised:
-        slope, value = jax.jacfwd(lambda x: (function(x, share),) * 2, has_aux=True)(x)
+    def both(x: Array, *more: Array) -> Linearised:
+        slope, value = jax.jacfwd(lambda x: (function(x, *more),) * 2, has_aux=True)(x)
         return Linearised(*value, *slope)
 
     return jax.jit(both)
@@ -65,7 +65,7 @@ def restore_feasibility(
     """Return the unknowns of a motion, changed little, for the net rotation wanted and all joints within limits.
 
     Args:
-        linearise: conditions of the motion and their derivatives.
+        linearise: conditions of the motion and their derivatives, by the unknowns and shares of the pieces (2, p, j).
         build: makes the motion.
         miss: of a motion, exactly what the equality gives roughly.
         start: the unknowns.

@@ -128,7 +128,9 @@ def free_law(
     def build(x: Array) -> Trajectory:
         inner = jnp.concatenate([jnp.zeros((edges, 1)), x[edges:].reshape(edges, points), jnp.ones((edges, 1))], 1)
         parts = [
-            through(Path(corners[e][None] + inner[e][:, None] * (corners[e + 1] - corners[e])[None]), x[e] / (points + 1))
+            through(
+                Path(corners[e][None] + inner[e][:, None] * (corners[e + 1] - corners[e])[None]), x[e] / (points + 1)
+            )
             for e in range(edges)
         ]
         return join(parts)

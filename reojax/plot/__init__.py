@@ -26,6 +26,7 @@ from reojax.plot.maps import (
     draw_poses as draw_poses,
 )
 from reojax.plot.motion import motion_figure as motion_figure, torque_speed_figure as torque_speed_figure
+from reojax.plot.nearest import draw_nearest as draw_nearest, mark_nearest as mark_nearest
 from reojax.plot.plans import plan_figure as plan_figure
 from reojax.plot.robots import draw_axes as draw_axes, draw_robot as draw_robot, draw_robot_flat as draw_robot_flat
 from reojax.plot.sweeps import sweep_figure as sweep_figure

@@ -9,13 +9,16 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from reojax._internal.arrays import Array
+from reojax.collision.nearest import nearest_parts
 from reojax.drawing.colours import ANGLES, DASHES, INK, JOINTS
 from reojax.mechanics.attitude import LEVEL, tilt_and_roll, zxz_without_jumps
 from reojax.mechanics.holonomy import rotation_history
 from reojax.path import Path
 from reojax.plot._style import dress_path
+from reojax.plot.nearest import draw_nearest, mark_nearest
 from reojax.robot import Robot
 
 _SAMPLES = 64
@@ -85,6 +88,7 @@ def history_figure(
     edge_names: Sequence[str] | None = None,
     rotations: Float[Array, "m 3 3"] | None = None,
     angles: Literal["tilt", "zxz"] = "tilt",
+    clearance: bool = False,
 ) -> Figure:
     """Draw how the base turns along a path, and what the joints do.
 
@@ -100,19 +104,31 @@ def history_figure(
         edge_names: a name for each edge.
         rotations: the `rotation_history` of the path, if it is known already.
         angles: "tilt" or "zxz", as in `draw_orientation`.
+        clearance: whether to show where the robot comes nearest to itself, beside the curves.
 
     Raises:
-        ValueError: if the path has no edge or does not fit the robot, or the names do not fit the path.
+        ValueError: if the path has no edge or does not fit the robot, or the names do not fit the path; or the robot
+            has no pairs of shapes whose clearance could be shown.
     """
     if not path.edges:
         raise ValueError("`path` has one waypoint; a picture needs an edge.")
     if edge_names is not None and len(edge_names) != path.edges:
         raise ValueError(f"`edge_names` has {len(edge_names)} names; the path has {path.edges} edges.")
     history = rotation_history(robot, path, samples=_SAMPLES) if rotations is None else rotations
-    figure = Figure(figsize=(7.2, 6.4), layout="constrained", facecolor="white")
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.15, 1))
+    near = nearest_parts(robot, path) if clearance else None
+    figure = Figure(figsize=(7.2 if near is None else 11.0, 6.4), layout="constrained", facecolor="white")
+    grid = figure.add_gridspec(2, 1 if near is None else 2, height_ratios=(1.15, 1))
+    above = figure.add_subplot(grid[0, 0])
+    below = figure.add_subplot(grid[1, 0], sharex=above)
+    above.tick_params(labelbottom=False)
     draw_orientation(above, history, edges=path.edges, angles=angles)
     draw_joints(below, robot, path)
+    if near is not None:
+        place = figure.add_subplot(grid[:, 1], projection="3d")
+        assert isinstance(place, Axes3D)
+        draw_nearest(place, robot, near)
+        for axes in (above, below):
+            mark_nearest(axes, near.at)
     _name_edges(below, edge_names, path.edges)
     above.set_title(title or robot.name, loc="left", pad=48, fontsize=13, fontweight="bold", color=INK)
     end = np.rad2deg(tilt_and_roll(history)[-1])

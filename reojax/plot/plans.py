@@ -9,6 +9,7 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from reojax import so3
 from reojax._internal.arrays import Array
+from reojax.collision.nearest import nearest_parts
 from reojax.drawing.colours import AXES, GREY, INK, PALE
 from reojax.drawing.view import View, default_view
 from reojax.mechanics.holonomy import rotation_history
@@ -16,6 +17,7 @@ from reojax.path import polygon
 from reojax.planning import FreePaths, Plan
 from reojax.plot._style import dress_path
 from reojax.plot.history import draw_joints
+from reojax.plot.nearest import draw_nearest, mark_nearest
 from reojax.robot import Robot
 
 _SAMPLES = 24
@@ -25,7 +27,12 @@ _NAMED = 12
 
 
 def plan_figure(
-    robot: Robot, plan: Plan | FreePaths, target: Float[Array, "3 3"], *, title: str | None = None
+    robot: Robot,
+    plan: Plan | FreePaths,
+    target: Float[Array, "3 3"],
+    *,
+    title: str | None = None,
+    clearance: bool | None = None,
 ) -> Figure:
     """Draw a plan or a free closed path for one target.
 
@@ -38,9 +45,12 @@ def plan_figure(
         plan: a plan for one target, of one manoeuvre or more, or a free path.
         target: (3, 3) the rotation it was made for.
         title: default the word, or "closed path".
+        clearance: whether to show where the robot comes nearest to itself, the two nearest points joined by a line;
+            default if the plan was asked for a clearance.
 
     Raises:
-        ValueError: if the plan has no manoeuvre, or is for many targets.
+        ValueError: if the plan has no manoeuvre, or is for many targets; or the robot has no pairs of shapes whose
+            clearance could be shown.
     """
     corners = np.asarray(plan.waypoints, float)
     if corners.ndim != 2:
@@ -52,9 +62,10 @@ def plan_figure(
     history = np.asarray(rotation_history(robot, path, samples=_SAMPLES))
     cosine = 0.5 * (np.einsum("mij,ij->m", history, wanted) - 1)
     left = np.rad2deg(np.arccos(np.clip(cosine, -1, 1)))
-    figure = Figure(figsize=(10.5, 5.2), layout="constrained", facecolor="white")
+    near = nearest_parts(robot, path) if (plan.clearance is not None if clearance is None else clearance) else None
+    figure = Figure(figsize=(10.5, 5.2 if near is None else 7.6), layout="constrained", facecolor="white")
     grid = figure.add_gridspec(2, 2, width_ratios=(1, 1.25))
-    sphere = figure.add_subplot(grid[:, 0], projection="3d")
+    sphere = figure.add_subplot(grid[:, 0] if near is None else grid[0, 0], projection="3d")
     assert isinstance(sphere, Axes3D)
     _draw_sphere(sphere, history, wanted, default_view(robot))
     above = figure.add_subplot(grid[0, 1])
@@ -65,6 +76,13 @@ def plan_figure(
     above.set_ylim(0, None)
     draw_joints(below, robot, path)
     below.set_xlabel("along the path, edge by edge", color=INK)
+    if near is not None:
+        place = figure.add_subplot(grid[1, 0], projection="3d")
+        assert isinstance(place, Axes3D)
+        draw_nearest(place, robot, near)
+        place.set_axis_off()
+        for axes in (above, below):
+            mark_nearest(axes, near.at)
     short = "closed path"
     if isinstance(plan, Plan):
         short = "-".join(plan.word) if len(plan.word) <= _NAMED else f"{len(plan.word)} loops"

@@ -9,8 +9,10 @@ from jaxtyping import Float
 
 from reojax._internal import checks
 from reojax.captures.comparison import Comparison
+from reojax.collision.nearest import Nearest, nearest_parts
 from reojax.mechanics.certificate import Certificate, certify_rotation
 from reojax.mechanics.holonomy import DEFAULT_STEPS, rotation_history
+from reojax.mechanics.kinematics import link_poses
 from reojax.motion.simulation import Motion, simulate
 from reojax.motion.trajectory import Trajectory
 from reojax.path import Path, polygon
@@ -24,6 +26,16 @@ _CERTIFIED = 48
 """Most edges of a path whose certificate is measured without being asked for."""
 _ANOTHER = 1e-2
 """Share of the momenta in a motion by which their sum may change, by rounding, before it is another robot's."""
+
+
+class NearestOnClock(NamedTuple):
+    """Where the robot's parts come nearest to each other along a clip."""
+
+    place: Nearest
+    clock: float
+    """When, on the clip's clock."""
+    own: Float[np.ndarray, "2 3"]
+    """The two nearest points, each in its link's frame [m]."""
 
 
 class Clip(NamedTuple):
@@ -46,6 +58,8 @@ class Clip(NamedTuple):
     """Torques and motors, where they are known."""
     notes: tuple[str, ...] = ()
     """What the reader of the page should know, such as that it was thinned."""
+    nearest: NearestOnClock | None = None
+    """Where the robot's parts come nearest to each other, if that was asked for."""
 
 
 def clip_of(robot: Robot, motion: Any, *, entry: str = "motion", certificate: bool | None = None) -> Clip:
@@ -79,6 +93,19 @@ def clip_of(robot: Robot, motion: Any, *, entry: str = "motion", certificate: bo
             "and `rotation` as a Motion does."
         )
     return _sampled(robot, motion, entry)
+
+
+def nearest_on_clock(robot: Robot, clip: Clip) -> NearestOnClock:
+    """Find where the parts come nearest to each other, proven along the straight ways between the clip's samples.
+
+    Raises:
+        ValueError: for a robot without pairs of shapes.
+    """
+    place = nearest_parts(robot, Path(clip.theta))
+    rotation, origin = (np.asarray(part, float) for part in link_poses(robot, place.theta))
+    links = list(place.links)
+    own = np.einsum("kji,kj->ki", rotation[links], place.points - origin[links])
+    return NearestOnClock(place, float(np.interp(place.at, np.arange(len(clip.clock)), clip.clock)), own)
 
 
 def measured_and_simulated(robot: Robot, comparison: Comparison) -> tuple[Clip, Clip]:

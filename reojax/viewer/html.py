@@ -21,7 +21,7 @@ from reojax.drawing.colours import ANGLES, AXES, JOINTS
 from reojax.drawing.view import View, default_view
 from reojax.robot import Robot
 from reojax.viewer import numbers
-from reojax.viewer.clip import Clip, clip_of, measured_and_simulated
+from reojax.viewer.clip import Clip, clip_of, measured_and_simulated, nearest_on_clock
 from reojax.viewer.scene import clip_data, robot_data, shorten, table
 
 _SCRIPTS = ("kinematics", "stage", "curves", "player")
@@ -42,6 +42,7 @@ def view(
     up: Literal["x", "y", "z"] | None = None,
     rows: Mapping[str, str] | None = None,
     certificate: bool | None = None,
+    clearance: bool | None = None,
 ) -> File:
     """Write a page that shows a robot turning, for any browser; below 2 MB, whole or not at all.
 
@@ -66,13 +67,16 @@ def view(
         up: axis that points up; default y for robots laid out as the thesis's, z for others.
         rows: more numbers for the table, text by name.
         certificate: whether to measure how sure the turn of a path is (`certify`); default for up to 48 edges.
+        clearance: whether to find where the parts of each robot come nearest to each other, as shown: told in the table
+            and under the title, marked in the curves, the two nearest points joined by a line; default for a plan that
+            was asked for a clearance.
 
     Returns:
         The file.
 
     Raises:
-        ValueError: if the file cannot be written, a motion is none or another robot's, the clocks differ, or the
-            target is no rotation.
+        ValueError: if the file cannot be written, a motion is none or another robot's, the clocks differ, the target
+            is no rotation, or `clearance` is asked of a robot that has no pairs of shapes.
     """
     checks.instance("robot", robot, Robot, "make_robot makes")
     where = check_ending(file, "page", ("html", "htm"))
@@ -95,6 +99,8 @@ def view(
         shown.append(("measured" if isinstance(motion, Comparison) else "ghost", robot, measured))
     if len({clip.timed for _, _, clip in shown}) > 1:
         raise ValueError("a path has no time, so it cannot be shown on one clock with a motion that has: simulate it.")
+    if getattr(motion, "clearance", None) is not None if clearance is None else clearance:
+        shown = [(role, own, clip._replace(nearest=nearest_on_clock(own, clip))) for role, own, clip in shown]
     labels = _labels(names, [role for role, _, _ in shown])
     data = _data(shown, labels, wanted, View(up=up) if up else default_view(robot), dict(rows or {}))
     data["title"] = title or robot.name

@@ -29,6 +29,8 @@ def rows(clip: Clip, target: Float[np.ndarray, "3 3"] | None) -> dict[str, str]:
     told["joint travel, all joints"] = f"{np.rad2deg(clip.travel):.0f}°"
     if clip.timed:
         told["duration"] = f"{clip.clock[-1]:.4g} s"
+    if clip.nearest is not None:
+        told["least clearance"] = nearest(clip)
     told |= _of_motors(clip) | _of_certificate(clip)
     return told
 
@@ -38,6 +40,16 @@ def angle_to(rotation: Float[np.ndarray, "m 3 3"], target: Float[np.ndarray, "3 
     turn = np.einsum("mji,jk->mik", rotation, target)
     sine = np.stack([turn[:, i, k] - turn[:, k, i] for i, k in ((2, 1), (0, 2), (1, 0))], axis=1)
     return np.arctan2(np.linalg.norm(sine, axis=1), np.trace(turn, axis1=1, axis2=2) - 1)
+
+
+def nearest(clip: Clip) -> str:
+    """Least clearance of a clip: distance, the two parts, and when; nothing where it was not looked for."""
+    if clip.nearest is None:
+        return ""
+    place = clip.nearest.place
+    gap = 1e3 * place.found
+    how = f"overlap by {_fixed(-gap, 2)} mm" if gap < 0 else f"{np.floor(1e5 * place.distance) / 100:.2f} mm"
+    return f"{how}, {place.name}, at {clip.nearest.clock:.4g} {'s' if clip.timed else 'edges'}"
 
 
 def _of_motors(clip: Clip) -> dict[str, str]:

@@ -69,6 +69,14 @@ def clip_data(clip: Clip, label: str, target: Float[np.ndarray, "3 3"] | None) -
         "theta": _list(clip.theta, 9),
         "quaternion": _list(quaternion, 10),
         "angles": _list(np.rad2deg(tilt_and_roll(clip.rotation)), 3),
+        "nearest": None
+        if clip.nearest is None
+        else {
+            "clock": round(clip.nearest.clock, 6),
+            "links": list(clip.nearest.place.links),
+            "points": _list(clip.nearest.own, 6),
+            "text": numbers.nearest(clip),
+        },
         "left": None if target is None else _list(np.rad2deg(numbers.angle_to(clip.rotation, target)), 4),
     }
 

@@ -36,3 +36,27 @@ def test_simulate_ends_with_1_where_parts_meet(capsys):
 def test_robots_without_pairs_are_refused(capsys):
     assert main(["simulate", "--robot", "planar2", "--clearance", "5mm"]) == 2
     assert capsys.readouterr().err.startswith("reojax simulate: ")
+
+
+def test_view_and_export_prove_the_clearance(capsys, tmp_path):
+    page, table = tmp_path / "turn.html", tmp_path / "turn.csv"
+    assert main(["view", "--clearance", "5mm", "--out", str(page)]) == 0
+    assert "clear: 16.281 mm proven" in capsys.readouterr().out
+    assert "least clearance" in page.read_text()
+    meeting = ["--manoeuvre", "b", "--twist", "-270", "--clearance", "5mm"]
+    assert main(["view", *meeting, "--out", str(page)]) == 1
+    assert "NOT clear by 5 mm" in capsys.readouterr().out
+    assert main(["export", str(table), "--duration", "1", *meeting]) == 1
+    assert "NOT clear by 5 mm" in capsys.readouterr().err
+    assert not table.exists()
+    assert main(["export", str(table), "--duration", "1", "--clearance", "5mm"]) == 0
+    assert table.exists()
+
+
+def test_show_says_where_the_clearance_is_least(capsys):
+    assert main(["show", "prototype", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["clearance"]
+    first, second = found["nearest_points_m"]
+    assert sum((a - b) ** 2 for a, b in zip(first, second, strict=True)) ** 0.5 == pytest.approx(found["found_m"])
+    assert main(["show", "planar2"]) == 0
+    assert "clearance: none" in capsys.readouterr().out

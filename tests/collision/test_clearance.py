@@ -67,6 +67,29 @@ def test_distances_are_those_of_coal():
     assert worst < 1e-10
 
 
+@pytest.mark.parametrize(
+    "robot", [arm(seed=5), reojax.robots.satellite_arm(), reojax.robots.astronaut()], ids=lambda r: r.name
+)
+def test_distances_are_those_of_mujoco(robot, tmp_path):
+    """MuJoCo places the capsules of a file that `write_mjcf` wrote by its own kinematics; overlaps too, to 1e-10 m."""
+    mujoco = pytest.importorskip("mujoco")
+    reojax.write_mjcf(robot, tmp_path / "robot.xml", rotors=False)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "robot.xml"))
+    data, rng = mujoco.MjData(model), np.random.default_rng(2)
+    body = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) for name in robot.link_names]
+    geoms = {k: list(np.flatnonzero(model.geom_bodyid == b)) for k, b in enumerate(body)}
+    geom = [geoms[link].pop(0) for link in robot.capsule_link]
+    where = [model.joint(name).qposadr[0] for name in robot.joint_names]
+    clearance, met = jax.jit(reojax.clearance), False
+    for theta in rng.uniform(-2, 2, (20, robot.joints)):
+        data.qpos[where] = theta
+        mujoco.mj_forward(model, data)
+        theirs = [mujoco.mj_geomDistance(model, data, geom[a], geom[b], 1e3, None) for a, b in robot.collision_pairs]
+        np.testing.assert_allclose(clearance(robot, theta), theirs, rtol=0, atol=1e-10)
+        met |= min(theirs) < 0
+    assert met
+
+
 def awkward(rng, count=400):
     """Segments (4, 3, n) that are parallel, on one line, without length, touching or crossing, and any."""
     p = rng.normal(size=(4, 3, count))

@@ -88,6 +88,10 @@ function makePanel(holder, panel, end, scrub) {
     });
     const corners = data.clips[0].corners;
     if (!data.timed && corners.length <= 41) corners.slice(1, -1).forEach((at) => line(x(at), top, x(at), height - bottom, "#c5ccd1"));
+    data.clips.filter((clip) => clip.nearest).forEach((clip) => {
+      const at = x(clip.nearest.clock);
+      element(svg, "line", { x1: at, x2: at, y1: top, y2: height - bottom, stroke: NEAR, "stroke-dasharray": "4 2" }, SVG);
+    });
     const marks = data.timed ? ticks(0, end, 6, [1, 2, 5, 10]) : ticks(0, end, 10, [1, 2, 5, 10]).filter(Number.isInteger);
     marks.forEach((at) => {
       const last = at === marks[marks.length - 1];

@@ -89,6 +89,7 @@ function writeTexts() {
     data.robots.map((robot) => `${robot.name}: ${robot.links.length} links, ${robot.joints.length} joints`).join("; "),
     data.timed ? `${+end.toPrecision(4)} s` : `${+end.toPrecision(4)} edges of a path, which has no time`,
     "free fall, centre of mass at rest",
+    ...data.clips.slice(0, 1).filter((clip) => clip.nearest).map((clip) => `least clearance ${clip.nearest.text}`),
   ].join(" \u00b7 ");
   const solid = data.clips.filter((clip) => !clip.ghost);
   if (solid.length > 1) solid.forEach((clip) => { element(find("labels"), "span").textContent = clip.label; });
@@ -102,6 +103,7 @@ function writeTexts() {
   };
   legend("box", data.robots[first.robot].links[0].colour, "base, " + data.robots[first.robot].links[0].name);
   legend("line", "#8b979f", "inertial X, Y, Z");
+  if (first.nearest) legend("line", NEAR, "nearest parts");
   if (data.target) legend("ring", "#555", "target of the base's axes");
   ghosts.forEach((clip) => legend("box", "#b8bec2", `translucent: ${clip.label}`));
 
@@ -181,6 +183,8 @@ window.reojax = {
   samples: (clip = 0) => data.clips[clip].clock.length,
   clock: () => clock,
   playing: () => playing,
+  // Distance of the two marked points of a clip, now.
+  gap: (clip = 0) => stage.bodies[clip].nearest.gap(),
   speed: () => RATES[rate],
   // Move to sample i of a clip; its base's rotation and its links' frames, about the robot's centre of mass.
   poses(i, clip = 0) {

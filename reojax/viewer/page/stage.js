@@ -1,5 +1,6 @@
 // The robots in space: links, axes of base, target and inertial space, and the track of a body axis on a sphere.
 const GHOST = "#4d5a63";
+const NEAR = "#d4006a";
 
 function makeStage(canvas, holder) {
   const clips = data.clips;
@@ -220,12 +221,14 @@ function makeBody(robot, clip) {
     root.add(frame);
     frames.push(frame);
   });
+  const nearest = clip.nearest ? makeNearest(root, clip.nearest, robot.size) : null;
   function pose(state) {
     root.quaternion.copy(state.rotation);
     linkMatrices(robot, state.theta).forEach((matrix, k) => {
       frames[k].matrix.copy(matrix);
       frames[k].matrixWorldNeedsUpdate = true;
     });
+    if (nearest) nearest.pose(frames);
   }
   // How far the robot reaches from its centre of mass in any sampled posture.
   let reach = 0;
@@ -242,7 +245,28 @@ function makeBody(robot, clip) {
       });
     });
   }
-  return { root, frames, pose, reach: reach * 1.02 || robot.size };
+  return { root, frames, pose, nearest, reach: reach * 1.02 || robot.size };
+}
+
+// The two points of the surfaces that come nearest to each other in this motion, on their links, joined by a line.
+function makeNearest(root, nearest, size) {
+  const skin = new THREE.MeshBasicMaterial({ color: NEAR, depthTest: false, transparent: true });
+  const dots = nearest.points.map(() => new THREE.Mesh(new THREE.SphereGeometry(size * 0.012, 16, 12), skin));
+  const line = new THREE.Line(
+    new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3(1, 0, 0)]),
+    new THREE.LineBasicMaterial({ color: NEAR, depthTest: false, transparent: true }),
+  );
+  line.frustumCulled = false;
+  [line, ...dots].forEach((part) => { part.renderOrder = 5; root.add(part); });
+  function pose(frames) {
+    const ends = line.geometry.getAttribute("position");
+    dots.forEach((dot, i) => {
+      dot.position.set(...nearest.points[i]).applyMatrix4(frames[nearest.links[i]].matrix);
+      ends.setXYZ(i, dot.position.x, dot.position.y, dot.position.z);
+    });
+    ends.needsUpdate = true;
+  }
+  return { pose, gap: () => dots[0].position.distanceTo(dots[1].position) };
 }
 
 function capsule(start, end, radius, skin) {

@@ -1,0 +1,75 @@
+"""The condition that a robot stays clear of itself along its whole loop, as an inequality that can be tightened."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+
+from reojax.collision.constraint import clearance_shortfall
+from reojax.optimisation.optimise import Solution
+from reojax.optimisation.status import Status
+
+_BETWEEN = 2.0
+"""Clearance kept in hand for what lies between samples: for leaving the chord, and for normals that turn."""
+TIGHTENED = 3
+"""How often at most the condition is tightened where the proof of an answer falls short of it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ClearBy:
+    """A measure, see `reojax.design.clear_by`, which makes it."""
+
+    margin: float
+    """Least distance between any two parts of the robot [m]."""
+    samples: int | None = None
+    """Per edge; None for 96 along the whole loop."""
+    spare: float = 0.0
+    """Asked for on top, where a proof fell short of the margin [m]."""
+
+    def __call__(self, outcome: Any) -> jax.Array:
+        """What is missing to the margin, for an inequality."""
+        wanted = self.margin + self.spare
+        return clearance_shortfall(
+            outcome.robot, outcome.path.waypoints, wanted, samples=self.samples, between=_BETWEEN
+        )
+
+    def tighter(self, level: int) -> ClearBy:
+        """The same with more in hand: some at level 1, and three times as much at each further one."""
+        return dataclasses.replace(self, spare=(0.02 * abs(self.margin) + 1e-4) * 3.0 ** (level - 1) if level else 0.0)
+
+
+def prove(
+    found: Solution,
+    run: Callable[[np.ndarray, np.ndarray, int], Solution],
+    kept: Callable[[np.ndarray], np.ndarray],
+) -> Solution:
+    """Prove the clearance of all answers that have converged, and mend those that fall short.
+
+    These are solved again, each from where it is, with more asked for; one that still falls short has not converged.
+
+    Args:
+        found: the answers.
+        run: solves from points (r, n) those of the starts with numbers (r,), the condition tightened to a level.
+        kept: which of some points (r, n) are proven to keep the clearance.
+    """
+    fields = {name: np.array(value) for name, value in found._asdict().items() if name != "best"}
+    short = np.flatnonzero(found.converged)
+    for level in range(1, TIGHTENED + 2):
+        short = short[~kept(fields["value"][short])] if len(short) else short
+        if not len(short):
+            break
+        if level > TIGHTENED:
+            fields["converged"][short], fields["status"][short] = False, Status.NOT_FOUND
+            break
+        again, before = run(fields["value"][short], short, level), fields["steps"][short]
+        for name, value in fields.items():
+            value[short] = getattr(again, name)
+        fields["steps"][short] += before
+        short = short[fields["converged"][short]]
+    reached = fields["converged"]
+    best = np.where(reached, fields["cost"], np.inf).argmin() if reached.any() else fields["residual"].argmin()
+    return Solution(**fields, best=int(best))

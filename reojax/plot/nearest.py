@@ -1,0 +1,43 @@
+"""Where a robot comes nearest to itself: the posture with its two nearest points, and a line along the path."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from mpl_toolkits.mplot3d.axes3d import Axes3D
+
+from reojax.collision.nearest import Nearest
+from reojax.drawing.colours import INK
+from reojax.drawing.view import View
+from reojax.plot.robots import draw_robot, poses
+from reojax.robot import Robot
+
+_MARK = "#d4006a"
+
+
+def draw_nearest(axes: Axes3D, robot: Robot, nearest: Nearest, *, view: View | None = None) -> Axes3D:
+    """Draw the robot where its parts are nearest to each other, translucent, the two nearest points joined by a line.
+
+    Args:
+        axes: 3-D axes.
+        robot: the robot.
+        nearest: what `nearest_parts` gives.
+        view: from where to look; default from the front.
+    """
+    draw_robot(axes, robot, nearest.theta, view=view, alpha=0.25)
+    points = nearest.points + poses(robot, nearest.theta)[1][0]  # seen from the centre of mass
+    axes.plot(*points.T, "o-", color=_MARK, markersize=4, linewidth=1.8, zorder=1000)
+    axes.set_title(nearest_text(nearest), fontsize=10.5, color=INK)
+    return axes
+
+
+def mark_nearest(axes: Axes, at: float) -> None:
+    """Draw a line where the parts are nearest to each other, at a place on the axes' x."""
+    axes.axvline(at, color=_MARK, linewidth=1.4, linestyle=(0, (4, 2)), zorder=1.5)
+
+
+def nearest_text(nearest: Nearest) -> str:
+    """Least distance, the two parts, and the place, in two lines."""
+    gap = 1e3 * nearest.found
+    how = f"overlap by {-gap:.1f} mm" if gap < 0 else f"{np.floor(1e4 * nearest.distance) / 10:.1f} mm apart"
+    return f"{nearest.name}:\n{how}, at {nearest.at:.2f} edges"
