@@ -10,9 +10,9 @@ from reojax import so3
 from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax._internal.checks import numbers
-from reojax.design.self_clearance import ClearBy
 from reojax.design.loops import Loops
 from reojax.design.problem import Measure, Outcome
+from reojax.design.self_clearance import ClearBy
 from reojax.path import joint_travel
 
 

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers
 from reojax.collision.path_clearance import PathClearance, path_clearance
-from reojax.design.self_clearance import TIGHTENED, ClearBy, prove
 from reojax.design.loops import Loops
+from reojax.design.self_clearance import TIGHTENED, ClearBy, prove
 from reojax.design.variables import Space, Variable
 from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation
 from reojax.optimisation.functions import Functions
