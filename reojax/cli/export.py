@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> None:
         if clear is not None and not clear["kept"]:
             print("\n".join(clearance_text(clear)[1:] + ["nothing is written"]), file=sys.stderr)
             sys.exit(1)
-        report = _write(robot, path, args) | {"clearance": clear}
+        report: dict[str, Any] = _write(robot, path, args) | {"clearance": clear}
     except ValueError as error:
         raise BadInput(f"reojax export: {error}") from error
     lines = [f"{report['points']} points in {report['duration_s']:.6g} s, written to {args.file}"]

@@ -57,12 +57,13 @@ def nearest_parts(robot: Robot, path: Path, *, tolerance: float = 1e-4) -> Neare
         least = path_clearance(robot, path, tolerance=tolerance)
         theta = np.asarray(posture_at(path.waypoints, least.at), float)
         pair = int(least.pair)
+        first, second = robot.collision_pairs[pair]
         return Nearest(
             distance=float(least.distance),
             found=float(least.found),
             pair=pair,
             name=pair_name(robot, pair),
-            links=tuple(robot.capsule_link[c] for c in robot.collision_pairs[pair]),
+            links=(robot.capsule_link[first], robot.capsule_link[second]),
             at=float(least.at),
             theta=theta,
             points=nearest_points(robot, theta, pair),
@@ -77,8 +78,8 @@ def nearest_points(robot: Robot, theta: ArrayLike, pair: int) -> Float[np.ndarra
     with jax.enable_x64(True):
         geometry = unit_axes(geometry_of(robot), np.dtype(float))
         ends = pair_ends(structure_of(robot), geometry, np.asarray(theta, float)[:, None])
+        s, t = (float(share) for share in closest_parameters(*(end[:, pair, 0] for end in ends)))
         a0, a1, b0, b1 = (np.asarray(end)[:, pair, 0] for end in ends)
-        s, t = (float(share) for share in closest_parameters(a0, a1, b0, b1))
     inner = np.stack([a0 + s * (a1 - a0), b0 + t * (b1 - b0)])
     apart = inner[1] - inner[0]
     length = np.linalg.norm(apart)

@@ -28,7 +28,7 @@ from reojax.motion.motor import Motor, demand, no_load_speed, per_joint, stall_t
 from reojax.motion.simulation import net_rotation_of
 from reojax.motion.trajectory import Trajectory, polynomial, stretch
 from reojax.motion.trajectory_clearance import trajectory_clearance
-from reojax.optimisation.optimise import optimise_together
+from reojax.optimisation.optimise import Solution, optimise_together
 from reojax.optimisation.status import Status
 from reojax.robot import Robot
 
@@ -43,8 +43,8 @@ _EXACT = 1e-8
 """Largest error of an answer's net rotation that counts as converged [rad]."""
 _TOLERANCE, _SLOPE = 1e-7, 1e-5
 """Of the optimiser: largest violation (rad, and shares of the supply), and slope."""
-_AGAIN = 3
-"""How often a motion is solved whose clearance turns out to be too little between the samples."""
+_AGAIN = 2
+"""How often a motion is solved again whose clearance turns out to be too little between the samples."""
 _ROUNDING = 1e-12
 """What a joint may be beyond its limit by rounding [rad]."""
 
@@ -177,27 +177,33 @@ def least_duration(task: Task, starts: np.ndarray, box: UnknownBox, max_steps: i
 
     fine = jax.jit(lambda trajectory: so3.log(task.goal.T @ net_rotation_of(robot, trajectory, _FINE)))
     linearised = with_jacobian(exact)
-    spare, proven, kept = 0.0 if task.apart is None else 0.02 * task.apart.margin + 1e-4, None, True
-    for _ in range(1 if task.apart is None else _AGAIN):
-        wanted = np.zeros(0) if task.apart is None else with_spare(task.apart.margin, spare, task.apart.have)
+
+    def solve(starts: np.ndarray, wanted: np.ndarray) -> tuple[Solution, np.ndarray, Trajectory]:
+        """The answers, the best of them polished, and its motion, run as fast as the motors allow."""
         found = optimise_together(
             sampled, starts, lower=box.lower, upper=box.upper, scale=box.scale, data=np.tile(wanted, (len(starts), 1)),
             tolerance=_TOLERANCE, slope_tolerance=_SLOPE, max_steps=max_steps, progress=progress,
         )  # fmt: skip
         best = np.asarray(found.value[found.best], float)
         if not task.kept or beyond(robot, build(best)) > _ROUNDING:
-            conditions = lambda x, share, wanted=wanted: linearised(x, share, wanted)
+            conditions = lambda x, share: linearised(x, share, wanted)
             best = restore_feasibility(conditions, build, fine, best, (box.lower, box.upper, box.scale))
         trajectory = build(best)
-        trajectory = stretch(trajectory, minimum_stretch(task.robot, trajectory, task.motors))
-        if task.apart is not None:
-            proven = trajectory_clearance(task.robot, trajectory).distance
-            kept = float(proven) >= task.apart.margin
-            if kept:
+        return found, best, stretch(trajectory, minimum_stretch(task.robot, trajectory, task.motors))
+
+    if task.apart is None:
+        (found, _, trajectory), proven, kept = solve(starts, np.zeros(0)), None, True
+    else:
+        margin, spare = task.apart.margin, 0.02 * task.apart.margin + 1e-4
+        found, best, trajectory = solve(starts, with_spare(margin, spare, task.apart.have))
+        proven = trajectory_clearance(task.robot, trajectory).distance
+        for _ in range(_AGAIN):  # what came too near between the samples, with more asked for at them
+            if proven >= margin:
                 break
-            # what came too near between the samples, with more asked for at them
-            spare = 2 * spare + task.apart.margin - float(proven)
-            starts = best[None]
+            spare = 2 * spare + margin - float(proven)
+            found, best, trajectory = solve(best[None], with_spare(margin, spare, task.apart.have))
+            proven = trajectory_clearance(task.robot, trajectory).distance
+        kept = bool(proven >= margin)
     error, past = jnp.linalg.norm(fine(trajectory)), beyond(robot, trajectory)
     past = past if past > _ROUNDING else 0.0  # a corner of a path may lie on a limit
     good = bool(found.converged[found.best]) and past == 0 and float(error) < _EXACT and kept

@@ -8,7 +8,7 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from reojax.collision.nearest import Nearest
 from reojax.drawing.colours import INK
-from reojax.drawing.view import View
+from reojax.drawing.view import View, default_view
 from reojax.plot.robots import draw_robot, poses
 from reojax.robot import Robot
 
@@ -22,13 +22,22 @@ def draw_nearest(axes: Axes3D, robot: Robot, nearest: Nearest, *, view: View | N
         axes: 3-D axes.
         robot: the robot.
         nearest: what `nearest_parts` gives.
-        view: from where to look; default from the front.
+        view: from where to look; default from where the line between the two points is seen best.
     """
-    draw_robot(axes, robot, nearest.theta, view=view, alpha=0.25)
+    look = _across(robot, nearest) if view is None else view
+    draw_robot(axes, robot, nearest.theta, view=look, alpha=0.25)
     points = nearest.points + poses(robot, nearest.theta)[1][0]  # seen from the centre of mass
     axes.plot(*points.T, "o-", color=_MARK, markersize=4, linewidth=1.8, zorder=1000)
     axes.set_title(nearest_text(nearest), fontsize=10.5, color=INK)
     return axes
+
+
+def _across(robot: Robot, nearest: Nearest) -> View:
+    """The default view, turned about its upright until the line between the nearest points is seen longest."""
+    front = default_view(robot)
+    along = nearest.points[1] - nearest.points[0]
+    turned = [front._replace(azimuth=front.azimuth + angle) for angle in range(-90, 91, 15)]
+    return max(turned, key=lambda v: np.linalg.norm((v.camera() @ along)[:2]))
 
 
 def mark_nearest(axes: Axes, at: float) -> None:

@@ -11,7 +11,7 @@ MARGIN = 0.02
 
 
 def problem():
-    """The most bend of manoeuvre A whose feet pass 20 mm apart, looked at three times an edge."""
+    """The most bend of manoeuvre A whose feet pass 20 mm apart, looked at thirteen times an edge."""
     return reojax.design.Problem(
         lambda v: (PROTOTYPE, reojax.manoeuvre_a(v["twist"], v["bend"])),
         [
@@ -19,7 +19,7 @@ def problem():
             reojax.design.Variable("bend", 100.0, 120.0, unit="deg"),
         ],
         objective=lambda outcome: -outcome.values["bend"],
-        inequality=[reojax.design.clear_by(MARGIN, samples=3)],
+        inequality=[reojax.design.clear_by(MARGIN, samples=12)],
     )
 
 
