@@ -157,7 +157,9 @@ def Steering(
     keep = None if clearance is None else keep_of(robot, trajectory, clearance)
     dtype = common_float(robot, trajectory)
     one = partial(jnp.asarray, dtype=dtype)
-    plain = without_names(robot, couplings=True)  # one compiled step serves all robots of this tree
+    plain = without_names(
+        robot, couplings=True, shapes=keep is not None
+    )  # one compiled step serves all robots of this tree
     robot, trajectory, h = jax.tree.map(one, (plain, trajectory, np.asarray(h, float)))
     table = {name: one(value) for name, value in gain_table(gains).items()} | {"momentum": h, "to_end": gains.to_end}
     table["drift"] = drift_of(robot, chosen, gains, h)
