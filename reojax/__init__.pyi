@@ -43,6 +43,8 @@ from reojax.planning.plan_file import SavedPlan, load_plan, save_plan
 from reojax.planning.result import Plan
 from reojax.robot import Robot, layout_of, make_robot
 from reojax.steering.feedback import Steering as Steering
+from reojax.session import CompilationCache, cache
+from reojax.steering.feedback import Reading as Reading, References as References, Steering as Steering
 from reojax.steering.gains import CorrectionGains as CorrectionGains, correction_gains as correction_gains
 from reojax.steering.readings import Reading as Reading, References as References
 from reojax.steering.result import Righting as Righting
@@ -59,6 +61,7 @@ __all__ = [
     "angular_momentum",
     "BadDesign",
     "base_velocity",
+    "cache",
     "calibrate",
     "Calibration",
     "Capsule",
@@ -69,6 +72,7 @@ __all__ = [
     "compare",
     "clearance",
     "Comparison",
+    "CompilationCache",
     "connection",
     "controllable_directions",
     "ControllableDirections",

@@ -32,7 +32,7 @@ PAGES = {
         "Measured motion, calibration, files for other programs.",
         ("captures", "files", "interop"),
     ),
-    "sweeps": ("Sweeps", "Any function over many designs.", ("sweeps",)),
+    "sweeps": ("Sweeps and sessions", "Any function over many designs; compiled programs kept.", ("sweeps", "session")),
     "viewer": ("Viewer and plot", "Pages for a browser, pictures and films.", ("viewer", "drawing", "plot")),
 }
 """Page -> title, a line below it, and the packages whose names are on it."""

@@ -99,6 +99,8 @@ def _draw(robot: "Robot", path: "Path", history: Any, motion: "Motion | None", a
 
 def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dict[str, Any], Any]:
     """Everything that is printed, as plain numbers, and the history of rotations."""
+    from functools import partial
+
     import jax
     import numpy as np
 
@@ -106,12 +108,13 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
     from reojax.mechanics.attitude import tilt_and_roll
     from reojax.mechanics.certificate import DEFAULT_SAMPLES, certify_rotation
     from reojax.mechanics.holonomy import DEFAULT_STEPS
+    from reojax.session import LEAST_COMPILE
 
     longest = np.rad2deg(np.abs(np.diff(path.waypoints, axis=0)).max())
     finer = max(1, int(np.ceil(longest / _RESOLVED - 1e-9)))
     steps, samples = finer * DEFAULT_STEPS, finer * DEFAULT_SAMPLES
 
-    @jax.jit
+    @partial(jax.jit, compiler_options=LEAST_COMPILE)
     def compute(path: "Path") -> tuple[Any, ...]:  # one program to compile; the robot is constant in it
         certificate, rotation, history = certify_rotation(robot, path, steps=steps, samples=samples)
         read = (so3.log, so3.to_euler_zxz, so3.angle, so3.to_quaternion)

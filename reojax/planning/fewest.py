@@ -110,7 +110,7 @@ def _with_loops(
 ) -> None:
     """Try words of `slots` loops for what is not reached yet; with `whatever` also where there is little hope."""
     waiting = np.flatnonzero(~answer.solved)
-    if not whatever:
+    if len(waiting) and not whatever:
         waiting = waiting[scene.pool.reaches(targets[:, waiting], slots, _FAR.get(slots, _FAR_LONG))]
     closest = np.zeros(len(waiting))
     close = _CLOSE_FEW.get(slots, _CLOSE)

@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float
 from reojax._internal.arrays import Array
 from reojax.planning.residual import Miss, Word, chain, dual, miss, pull, step
 from reojax.planning.table import Table, read
+from reojax.session import LEAN_COMPILE
 
 _SOLVED = 1e-14
 """Squared residual [rad^2] at which the search on the table stops; the true rotations take over."""
@@ -38,7 +39,7 @@ class Iterate(NamedTuple):
     """Whether more steps may bring it to the target."""
 
 
-@jax.jit
+@partial(jax.jit, compiler_options=LEAN_COMPILE)
 def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Iterate:
     """Bring words to their targets by Levenberg-Marquardt steps, clipped to the box."""
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
@@ -65,7 +66,7 @@ def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Iterate:
     return Iterate(x, at.square, (at.square > _SOLVED) & (alone | (at.square < _STALLED * before[1])))
 
 
-@partial(jax.jit, static_argnums=4)
+@partial(jax.jit, static_argnums=4, compiler_options=LEAN_COMPILE)
 def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], steps: int = 20) -> Iterate:
     """Move solved words along their solutions to less travel, `sum(price |x|)`, each amplitude keeping its sign."""
     sign = jnp.where(x < 0, -1.0, 1.0).astype(x.dtype)
@@ -100,7 +101,7 @@ def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], st
     return Iterate(x, at.square, at.square < 0)
 
 
-@jax.jit
+@partial(jax.jit, compiler_options=LEAN_COMPILE)
 def refine(
     table: Table, word: Word, x: Array, true: Float[Array, "4 k m"], strength: Float[Array, " m"]
 ) -> tuple[Array, Array]:

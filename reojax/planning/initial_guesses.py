@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -11,18 +11,21 @@ from jaxtyping import Bool, Float, Int
 from reojax.planning import quaternions
 from reojax.planning.table import Table, read
 from reojax.planning.words import AmplitudeBox
+from reojax.session import LEAST_COMPILE
 
 _POOL = 4096
 """Loops drawn for each letter."""
 _WORDS = 1 << 16
 """Words of each length."""
+_FEW = 16
+"""Targets for which all words are looked through; more than these are looked up in a tree."""
 
 FIRST = 3
 """Starts that are simply the nearest ones."""
 _CANDIDATES, _CHOICE = 250, 3
 """Words among which the others are chosen: so many, or so many times as many as are chosen."""
 
-_read = jax.jit(read)
+_read = jax.jit(read, compiler_options=LEAST_COMPILE)
 
 
 class Starts(NamedTuple):
@@ -54,11 +57,11 @@ class GuessTable:
         self._kind = 2 * letter + turns[0] if len(turns) == 1 else 2 * turns[0] + turns[1]
         self._q = np.asarray(_read(table, letter, x)[0])
         self.letters, self.amplitudes, self.rotations = letter, x, self._q
-        self._words = {}
+        self._words: dict[int, _Words] = {}
 
     def reaches(self, target: Float[np.ndarray, "4 m"], slots: int, within: float) -> Bool[np.ndarray, " m"]:
         """Whether a word of `slots` loops ends within a chord of each target."""
-        return np.isfinite(self._of(slots)[1].query(target.T, distance_upper_bound=within, workers=-1)[0])
+        return self._words_of(slots).nearest(target, 1)[0][:, 0] < within
 
     def near(self, target: Float[np.ndarray, "4 m"], slots: int, count: int) -> Starts:
         """Words of `slots` loops near each target, (..., m, count), without regard to the quaternion's sign.
@@ -66,28 +69,57 @@ class GuessTable:
         First come the `FIRST` nearest ones, then the nearest of every kind (letters, and which way round each loop
         goes), then the second of every kind, and so on: where one fails, others of its kind mostly fail too.
         """
-        index, tree = self._of(slots)
+        words = self._words_of(slots)
         asked = count if count <= FIRST else max(_CHOICE * count, _CANDIDATES)
-        distance, nearest = tree.query(target.T, k=asked, workers=-1)
-        distance, loops = distance.reshape(-1, asked), index[:, np.reshape(nearest, (-1, asked)) % index.shape[1]]
+        distance, nearest = words.nearest(target, asked)
+        loops = words.loops[:, nearest]
         if count < asked:
             chosen = _by_kind(self._kind[loops])[:, :count]
             distance = np.take_along_axis(distance, chosen, 1)
             loops = np.take_along_axis(loops, chosen[None], 2)
         return Starts(self._letter[loops], self._x[:, loops], distance)
 
-    def _of(self, slots: int):
-        from scipy.spatial import KDTree
-
+    def _words_of(self, slots: int) -> _Words:
         if slots not in self._words:
             everything = np.arange(len(self._letter))[None]
-            index = everything if slots == 1 else _of_length(slots, len(self._letter))
-            q = self._q[:, index[0]]
-            for row in index[1:]:
+            loops = everything if slots == 1 else _of_length(slots, len(self._letter))
+            q = self._q[:, loops[0]]
+            for row in loops[1:]:
                 q = np.stack(quaternions.product(q, self._q[:, row]))
-            q = q / np.sqrt((q * q).sum(0))
-            self._words[slots] = index, KDTree(np.concatenate([q, -q], axis=1).T)
+            self._words[slots] = _Words(loops, q / np.sqrt((q * q).sum(0)))
         return self._words[slots]
+
+
+class _Words:
+    """Words of one length, found by their rotations."""
+
+    def __init__(self, loops: Int[np.ndarray, "k n"], q: Float[np.ndarray, "4 n"]):
+        self.loops, self._q = loops, q
+        self._tree: Any = None
+
+    def nearest(
+        self, target: Float[np.ndarray, "4 m"], count: int
+    ) -> tuple[Float[np.ndarray, "m count"], Int[np.ndarray, "m count"]]:
+        """Chords to the nearest words of each target, and which they are; nearest first."""
+        if self._tree is None and target.shape[1] > _FEW:
+            from scipy.spatial import KDTree  # importing it takes as long as it saves with few targets
+
+            self._tree = KDTree(np.concatenate([self._q, -self._q], axis=1).T)
+        if self._tree is None:
+            found = [_nearest(self._q, t[:, None], count) for t in target.T]
+            chords, words = ([part[i] for part in found] for i in (0, 1))
+            return np.reshape(chords, (-1, count)), np.reshape(np.array(words, int), (-1, count))
+        chord, word = (a.reshape(-1, count) for a in self._tree.query(target.T, k=count, workers=-1))
+        return chord, word % self._q.shape[1]
+
+
+def _nearest(
+    q: Float[np.ndarray, "4 n"], target: Float[np.ndarray, "4 1"], count: int
+) -> tuple[Float[np.ndarray, " count"], Int[np.ndarray, " count"]]:
+    square = np.minimum(((q - target) ** 2).sum(0), ((q + target) ** 2).sum(0))
+    first = np.argpartition(square, count - 1)[:count]
+    first = first[np.argsort(square[first], kind="stable")]
+    return np.sqrt(square[first]), first
 
 
 def _of_length(slots: int, loops: int) -> np.ndarray:

@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
@@ -294,68 +293,6 @@ def test_tilt_and_roll_make_up_the_rotation():
     np.testing.assert_allclose((tilt * roll).as_matrix(), rotations, atol=1e-12)
     turns = Rotation.from_rotvec(np.outer(np.linspace(0, 15, 40), [0, 0, 1])).as_matrix()
     np.testing.assert_allclose(tilt_and_roll(turns)[-1], [0, 0, 15], atol=1e-12)
-
-
-X64 = {"jax_enable_x64": True}
-
-
-@pytest.mark.parametrize(
-    ("cache", "given", "expected"),
-    [
-        (None, None, True),
-        ("1", None, True),
-        ("0", None, False),
-        (None, "/elsewhere", False),
-    ],
-)
-def test_the_cache_is_set_unless_it_is_off_or_set_already(monkeypatch, tmp_path, cache, given, expected):
-    told = _started(monkeypatch, tmp_path, cache, given)
-    folder = tmp_path / "reojax" / "jax"
-    assert (told.pop("jax_compilation_cache_dir", None) == str(folder)) is expected
-    assert folder.is_dir() is expected
-    assert told.pop("jax_enable_x64") is True
-
-
-def test_a_cache_that_cannot_be_breaks_nothing(monkeypatch, tmp_path):
-    (tmp_path / "reojax").touch()
-    assert _started(monkeypatch, tmp_path, None, None) == X64
-
-
-def _started(monkeypatch, folder, cache, given) -> dict:
-    """What `start` tells JAX."""
-    told = {}
-    config = SimpleNamespace(values={"jax_compilation_cache_dir": given}, update=told.__setitem__)
-    monkeypatch.setattr(session, "jax", SimpleNamespace(config=config))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
-    monkeypatch.delenv("REOJAX_CACHE")
-    if cache is not None:
-        monkeypatch.setenv("REOJAX_CACHE", cache)
-    session.start()
-    return told
-
-
-@pytest.mark.slow
-def test_a_damaged_entry_of_the_cache_is_made_anew(tmp_path):
-    """Without a word, and the next run finds it whole."""
-    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "JAX_COMPILATION_CACHE_DIR": "", "REOJAX_CACHE": "1"}
-    code = "from reojax import session; session.start(); import jax; print(jax.jit(lambda x: 2 * x)(3.0))"
-    folder = tmp_path / "reojax" / "jax"
-    for damage in (None, b"", b"damaged", None):
-        for file in folder.glob("*-cache"):
-            if damage is not None:
-                file.write_bytes(damage)
-        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-        assert (done.stdout, done.stderr) == ("6.0\n", "")
-        assert all(file.stat().st_size > 100 for file in folder.glob("jit_*-cache"))
-    assert list(folder.glob("jit_*-cache"))
-
-
-def test_the_cache_forgets_its_oldest_programs(tmp_path):
-    for age, name in enumerate(["new", "old", "oldest"]):
-        (tmp_path / name).write_bytes(bytes(100))
-        os.utime(tmp_path / name, (1e9 - age, 1e9 - age))
-    session._trim(tmp_path, 200)
-    assert sorted(os.listdir(tmp_path)) == ["new", "old"]
 
 
 def test_compiling_quickly_leaves_given_flags_alone(monkeypatch):

@@ -1,0 +1,99 @@
+"""How long does a user wait for a first answer, without and with compiled programs kept from before?
+
+    python benchmarks/first_answers.py                      # two minutes; --quick: one turn
+    python benchmarks/first_answers.py --against FOLDER     # beside another version, unpacked there, by turns
+
+Every command and script runs in a process of its own, start of Python included, by the clock: first with an empty cache
+of compiled programs, then with what that run has left there. The least of three turns. `--only TEXT ...` takes the rows
+whose names contain one. Writes first_answers.json.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from _command import machine, options, run, say
+
+import reojax
+from reojax.files import check_writable, write_json
+
+_BEGIN = """
+import os, jax, numpy as np
+jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_compilation_cache_dir", os.environ["XDG_CACHE_HOME"])
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+import jax.numpy as jnp
+import reojax
+from reojax.robots.random import random_robot
+seven = random_robot(7, 7, limits=(-1.5, 1.5))
+corners = jnp.asarray(np.random.default_rng(0).uniform(-1, 1, (5, 7))).at[-1].set(0.0).at[0].set(0.0)
+score = lambda corners: (reojax.net_rotation(seven, reojax.Path(corners)) * jnp.arange(9.0).reshape(3, 3)).sum()
+"""
+_DESIGN = """
+from reojax import design
+robot = {robot}
+loop = design.polygons(robot, {corners})
+problem = design.Problem(lambda v: (robot, loop.path(v["loop"])), [loop], objective=design.travel(loop),
+                         equality=[design.turned_to({target})], steps=4)
+problem.solve(problem.starts(8, seed=1), max_steps=1)
+"""
+TASKS: dict[str, list[str]] = {
+    "reojax --help": ["-m", "reojax", "--help"],
+    "reojax simulate": ["-m", "reojax", "simulate"],
+    "reojax time": ["-m", "reojax", "time"],
+    "reojax plan --target 'rotvec 0 90 0'": ["-m", "reojax", "plan", "--target", "rotvec 0 90 0"],
+    "reojax plan --vocabulary free --target 'rotvec 0 90 0'": [
+        *("-m", "reojax", "plan", "--vocabulary", "free", "--target", "rotvec 0 90 0")
+    ],
+    "design problem of the prototype, 5 corners": [
+        "-c",
+        _BEGIN + _DESIGN.format(robot="reojax.robots.prototype()", corners=5, target=[0, 0, 3.1]),
+    ],
+    "design problem of 7 joints, 4 corners": [
+        "-c",
+        _BEGIN + _DESIGN.format(robot="seven", corners=4, target=[0, 0.4, 0.7]),
+    ],
+    "gradient of a loop of 7 joints": ["-c", _BEGIN + "jax.jit(jax.grad(score))(corners)"],
+    "Hessian of a loop of 7 joints": ["-c", _BEGIN + "jax.jit(jax.hessian(score))(corners)"],
+    "import jax": ["-c", "import jax"],
+}
+"""What runs, as arguments of Python."""
+
+
+def main(out: Path, *, quick: bool, against: Path | None, only: list[str] | None) -> None:
+    """Measure, print and write."""
+    result = check_writable(out / "first_answers.json")
+    homes = {"this": Path(reojax.__file__).parents[1]} | ({"other": against} if against else {})
+    names = [name for name in TASKS if only is None or any(text in name for text in only)]
+    rows = []
+    print("| first answer [s] | " + " | ".join(f"{home}, no cache | kept programs" for home in homes) + " |")
+    print("|---|" + "--:|" * 2 * len(homes))
+    for name in names:
+        taken: dict[str, list[tuple[float, float]]] = {home: [] for home in homes}
+        for _ in range(1 if quick else 3):
+            for home, place in homes.items():
+                with tempfile.TemporaryDirectory() as folder:
+                    taken[home].append((_seconds(name, place, folder), _seconds(name, place, folder)))
+        least = {home: [min(times) for times in zip(*runs, strict=True)] for home, runs in taken.items()}
+        print(f"| {name} | " + " | ".join(f"{seconds:.2f}" for pair in least.values() for seconds in pair) + " |")
+        rows.append({"what": name, "seconds": least, "all": taken})
+    write_json(result, {"machine": machine(), "rows": rows})
+    say(f"wrote {result}")
+
+
+def _seconds(name: str, home: Path, folder: str) -> float:
+    environment = {**os.environ, "PYTHONPATH": str(home), "XDG_CACHE_HOME": folder, "REOJAX_CACHE": "1"}
+    environment.pop("JAX_COMPILATION_CACHE_DIR", None)
+    begin = time.perf_counter()
+    subprocess.run([sys.executable, *TASKS[name]], env=environment, capture_output=True, check=True, cwd=home)
+    return time.perf_counter() - begin
+
+
+if __name__ == "__main__":
+    parser = options(__doc__)
+    parser.add_argument("--against", type=Path, metavar="FOLDER", help="root of another version's files")
+    parser.add_argument("--only", nargs="+", metavar="TEXT", help="rows whose names contain one of these")
+    run(main, parser)
