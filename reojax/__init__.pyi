@@ -42,9 +42,8 @@ from reojax.planning.plan import plan, plan_many, replan
 from reojax.planning.plan_file import SavedPlan, load_plan, save_plan
 from reojax.planning.result import Plan
 from reojax.robot import Robot, layout_of, make_robot
-from reojax.steering.feedback import Steering as Steering
 from reojax.session import CompilationCache, cache
-from reojax.steering.feedback import Reading as Reading, References as References, Steering as Steering
+from reojax.steering.feedback import Steering as Steering
 from reojax.steering.gains import CorrectionGains as CorrectionGains, correction_gains as correction_gains
 from reojax.steering.readings import Reading as Reading, References as References
 from reojax.steering.result import Righting as Righting
