@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from reojax.files import check_writable
 
-PARTS = ("turns", "bounds", "sensitivity", "motors")
+PARTS = ("turns", "thesis", "bounds", "sensitivity", "design", "flight", "motors")
 QUICK_ROBOTS = ("prototype", "planar4")
 
 

@@ -2,6 +2,8 @@
 
     python experiments/design_opt.py                # under a minute on 2 quiet cores, compilation included
     python experiments/design_opt.py --target 120 --quick
+    python experiments/design_opt.py --clearance 5               # nothing touches: 5 mm, proven; and the motors keep up
+    python experiments/design_opt.py --robot quadruped --axis x --target 30 --clearance 5
 
 First the prototype as it is, within 270/120: the best rectangle, polygon and smooth loop (spline) whose whole net
 rotation is the target, off-axis part included, each from 64 starts. Pinocchio replays the answers; derivatives are
@@ -12,6 +14,10 @@ the gear ratio, the other one as in the thesis or chosen freely.
 Expected: a polygon with free corners beats the rectangle by about 15 %, both reach the target to 1e-8; rectangles that
 start in the straight posture cannot, and need a short lead. Gears that couple more need less travel, so the free ratio
 ends at its bound; past about 100 kg mm^2 heavier feet gain no more (thesis figure 2.8).
+
+With `--clearance` the loops keep it, and end link inertia, gear ratio and amplitudes are chosen again with clearance
+and motors as conditions. With `--robot`, a name or a file, the same question of any robot: its best polygon, and what
+ends and gears between half and twice as they are would change.
 """
 
 from pathlib import Path
@@ -20,10 +26,11 @@ from typing import Any
 import numpy as np
 from common.script import options, run
 from common.tables import gradient_error, least_travel, summary, table
+from design_opt_parts import any_robot, constrained
 from matplotlib.figure import Figure
 
 import reojax
-from reojax import design, plot
+from reojax import design, plot, so3
 from reojax.design import Problem, Variable
 from reojax.files import check_writable, write_json
 from reojax.robots import prototype, with_end_inertia, with_gear_ratio
@@ -37,18 +44,31 @@ SAMPLES = 48
 INK = ("#0072b2", "#d55e00")
 
 
-def main(out: Path, *, quick: bool = False, target: float = 180.0) -> dict:
+def main(
+    out: Path,
+    *,
+    quick: bool = False,
+    target: float = 180.0,
+    axis: str = "z",
+    clearance: float | None = None,
+    robot: str = "prototype",
+) -> dict:
     """Print loops and trade-offs, write `design_opt` as .json, .png and .html (a page to look at)."""
     if not 0 < target < 360:
-        raise ValueError(f"`--target` is {target:g}; it must be a roll between 0 and 360 degrees.")
+        raise ValueError(f"`--target` is {target:g}; it must be a turn between 0 and 360 degrees.")
+    if clearance is not None and not 0 <= clearance < 1e4:
+        raise ValueError(f"`--clearance` is {clearance:g}; it must be a distance from 0 up, in mm.")
     picture, record = plot.check_picture(out / "design_opt.png"), check_writable(out / "design_opt.json")
     page = check_writable(out / "design_opt.html")
-    loops = best_loops(np.deg2rad(target), quick=quick)
+    apart = None if clearance is None else 1e-3 * clearance
+    if robot != "prototype" or axis != "z":
+        return _any(any_robot.robot_of(robot), target, axis, apart, record, page, quick=quick)
+    loops = best_loops(np.deg2rad(target), quick=quick, clearance=apart)
     curves = trade_off(np.deg2rad(target), points=5 if quick else 13)
 
     print(f"\nPrototype turned by {target:g} deg of roll, all three components, least joint travel within 270/120\n")
     rows = ("starts", "starts_converged", "starts_at_best", "travel_deg", "residual_rad", "slope", "miss_off_axis_rad",
-            "replay_rad", "gradient_error")  # fmt: skip
+            "replay_rad", "gradient_error", *(("clearance_mm",) if clearance is not None else ()))  # fmt: skip
     table(["", *(loop["loop"] for loop in loops)], [[row, *(loop[row] for loop in loops)] for row in rows], width=26)
     print("\nManoeuvre A, roll as wanted: least travel [deg] over one parameter, the other as in the thesis, or free\n")
     for name, curve in curves.items():
@@ -65,11 +85,42 @@ def main(out: Path, *, quick: bool = False, target: float = 180.0) -> dict:
         "loops": loops,
         "trade_off": curves,
     }
+    if apart is not None:
+        answer["constrained"] = choices = constrained.choices(np.deg2rad(target), apart, quick=quick)
+        print(
+            "Amplitudes, end link inertia and gear ratio of manoeuvre A by gradients, under more and more conditions\n"
+        )
+        columns = [key for key in choices[0] if key != "case"]
+        table(["", *columns], [[row["case"], *(_plain(row[key]) for key in columns)] for row in choices], width=16)
+        answer["converged"] &= all(row["converged"] for row in choices)
     plot.save(_picture(loops, curves, target), picture)
     write_json(record, answer)
     _show(loops, target, page)
     print(f"wrote {picture}, {record} and {page}")
     return answer
+
+
+def _any(
+    robot: reojax.Robot, target: float, axis: str, clearance: float | None, record: Path, page: Path, *, quick: bool
+) -> dict:
+    """The question for a robot of any kind."""
+    vector = np.deg2rad(target) * np.eye(3)["xyz".index(axis)]
+    rows, own = any_robot.solve(robot, vector, clearance, quick=quick)
+    print(f"\n{robot.name} turned by {target:g} deg about {axis}, all three components: least joint travel\n")
+    columns = [key for key in rows[0] if key != "case"]
+    table(["", *columns], [[row["case"], *(_plain(row[key]) for key in columns)] for row in rows])
+    replayed = own["replay_rad"]
+    print(f"\nreplayed by Pinocchio: {'missing' if replayed is None else f'{replayed:.1e} rad'}")
+    answer = {"target_deg": target, "axis": axis, "converged": all(r["converged"] > 0 for r in rows),
+              "choices": rows, "own": own}  # fmt: skip
+    write_json(record, answer)
+    reojax.view(robot, reojax.polygon(np.deg2rad(own["waypoints_deg"])), page, target=np.asarray(so3.exp(vector)))
+    print(f"wrote {record} and {page}")
+    return answer
+
+
+def _plain(value: object) -> object:
+    return "yes" if value is True else "no" if value is False else value
 
 
 def _show(loops: list[dict[str, Any]], target: float, page: Path) -> None:
@@ -86,19 +137,23 @@ def _show(loops: list[dict[str, Any]], target: float, page: Path) -> None:
     )
 
 
-def best_loops(roll: float, *, quick: bool) -> list[dict[str, Any]]:
-    """Best loop of each family, with its figures."""
+def best_loops(roll: float, *, quick: bool, clearance: float | None = None) -> list[dict[str, Any]]:
+    """Best loop of each family, with its figures; with a clearance [m] there is no spline, which takes long."""
     robot, target = prototype(), np.array([0.0, 0.0, roll])
     families = [(design.polygons(robot, 3 if quick else 5), 4)]
     if not quick:
         families.insert(0, (design.rectangles(robot, lead=True), 4))
+    if not quick and clearance is None:
         families.append((design.spline_loops(robot, 8, samples=SAMPLES), 1))
+    apart = [] if clearance is None else [design.clear_by(clearance)]
     answers = []
     for loop, steps in families:
-        problem = least_travel(robot, loop, steps=steps)
+        problem = least_travel(robot, loop, steps=steps, inequality=apart)
         starts = 16 if quick else 64
         found = problem.solve(starts, seed=1, hold={"target": target}, progress=loop.name, max_steps=100)
         answers.append(summary(problem, loop, found, target, steps=steps))
+        least = problem.outcome(found.value[found.best]).clearance.distance if apart else np.nan
+        answers[-1] |= {"clearance_mm": 1e3 * float(least)} if apart else {}
     corners = [np.deg2rad(answer["waypoints_deg"]) for answer in answers]
     for answer, error in zip(answers, gradient_error(robot, corners, steps=4), strict=True):
         answer["gradient_error"] = error
@@ -195,5 +250,8 @@ def _picture(loops: list[dict[str, Any]], curves: dict[str, dict[str, Any]], tar
 
 if __name__ == "__main__":
     parser = options(__doc__)
-    parser.add_argument("--target", type=float, default=180.0, help="roll to reach [deg] (default: 180)")
+    parser.add_argument("--target", type=float, default=180.0, help="turn to reach [deg] (default: 180)")
+    parser.add_argument("--axis", choices=("x", "y", "z"), default="z", help="axis of the turn (default: z, the roll)")
+    parser.add_argument("--clearance", type=float, metavar="MM", help="distance that the robot's parts keep [mm]")
+    parser.add_argument("--robot", default="prototype", help="a robot's name, or a file (default: prototype)")
     run(main, parser)

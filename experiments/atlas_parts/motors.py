@@ -115,10 +115,15 @@ def picture(row: Row) -> Figure:
     axes.set_xticks([6, 9, 12, 18, 24, 36, 60], ["6", "9", "12", "18", "24", "36", "60"])
     axes.minorticks_off()
     axes.legend(loc="upper right", frameon=True)
-    constant = RE_MAX_17.torque_constant
-    top = axes.secondary_xaxis(
-        "top", functions=(lambda v: v / constant * 30 / np.pi / 1e3, lambda n: n * constant * np.pi / 30 * 1e3)
-    )
+    per_volt = 30 / np.pi / 1e3 / float(RE_MAX_17.torque_constant)
+
+    def speed(volts: np.ndarray) -> np.ndarray:
+        return volts * per_volt
+
+    def volts_of(speed: np.ndarray) -> np.ndarray:
+        return speed / per_volt
+
+    top = axes.secondary_xaxis("top", functions=(speed, volts_of))
     top.set_xlabel("no-load speed [1000 rpm]: supply over torque constant, the same for every winding")
     top.minorticks_off()
     top.set_xticks([6, 10, 15, 20, 30, 50], ["6", "10", "15", "20", "30", "50"])

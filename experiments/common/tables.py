@@ -1,6 +1,7 @@
 """What the design experiments share: the problem of least travel to a target, replays, and how starts are counted."""
 
 import importlib.util
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -11,18 +12,20 @@ import reojax
 from common.types import Array
 from reojax import design, interop, so3
 from reojax.design import Loops, Problem, Solution, Variable
+from reojax.design.problem import Measure
 
 TARGET = Variable("target", [-7.0] * 3, [7.0] * 3, "rad")
 """Rotation vector to reach; held, so that one program serves all targets."""
 
 
-def least_travel(robot: reojax.Robot, loop: Loops, *, steps: int = 4) -> Problem:
+def least_travel(robot: reojax.Robot, loop: Loops, *, steps: int = 4, inequality: Sequence[Measure] = ()) -> Problem:
     """Least joint travel of a loop that turns the base to "target", all three components."""
     return Problem(
         lambda values: (robot, loop.path(values["loop"])),
         [loop, TARGET],
         objective=design.travel(loop),
         equality=[design.turned_to("target")],
+        inequality=inequality,
         steps=steps,
     )
 
