@@ -117,10 +117,10 @@ def picture(row: Row) -> Figure:
     axes.legend(loc="upper right", frameon=True)
     per_volt = 30 / np.pi / 1e3 / float(RE_MAX_17.torque_constant)
 
-    def speed(volts: np.ndarray) -> np.ndarray:
+    def speed(volts: Any) -> Any:
         return volts * per_volt
 
-    def volts_of(speed: np.ndarray) -> np.ndarray:
+    def volts_of(speed: Any) -> Any:
         return speed / per_volt
 
     top = axes.secondary_xaxis("top", functions=(speed, volts_of))
