@@ -31,8 +31,10 @@ _USED = 0.97
 """Share of the farthest loop that a run is asked for."""
 _ANY = 2.95
 """A loop that turns this far [rad], nearly the most that is looked for, is taken to do for any turn about its axis."""
-_TRIES = 3
+_TRIES = 2
 """Numbers of runs tried, each a quarter more than the one before, or one."""
+_EVEN, _RANDOM = (1.0, 0.6, 0.4), 2
+"""Shares of the box of joint limits, and number of random boxes."""
 _SAMPLES = 48
 """Postures per edge at which pairs are looked at for being too near."""
 _OFF = np.deg2rad(0.1)
@@ -93,6 +95,43 @@ def clear_turns(subject: Subject, targets: np.ndarray, effort: Effort) -> Turns:
     return found
 
 
+def boxed_turns(subject: Subject, targets: np.ndarray, effort: Effort) -> Turns:
+    """Turns that keep the subject's clearance, for robots of many joints and pairs: within boxes where little touches.
+
+    The search looks at no pair at all; it is made within smaller and smaller boxes about the posture at rest, and
+    within random ones, and of its answers those count which are proven clear with all pairs.
+    """
+    best = None
+    for low, high in _boxes(subject):
+        finder = _Finder(subject, subject.robot, None, effort, (low, high), subject.clearance)
+        found = finder.nothing(targets)
+        best = finder.nothing(targets) if best is None else best
+        finder.improve(found, targets, np.arange(len(targets)))
+        for k in range(len(targets)):
+            if found.reached[k] and not (best.reached[k] and best.travel[k] <= found.travel[k]):
+                for field in ("waypoints", "runs", "travel", "reached"):
+                    getattr(best, field)[k] = getattr(found, field)[k]
+            if not best.reached[k] or found.reached[k]:
+                best.status[k] = found.status[k]
+            if found.most[k] > best.most[k]:
+                best.most[k], best.farthest[k] = found.most[k], found.farthest[k]
+    assert best is not None
+    return best
+
+
+def _boxes(subject: Subject) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Boxes of joint angles about the posture at rest: shares of the robot's own, even ones, then random ones."""
+    freedom = freedom_of(subject.robot, start=subject.start, end=None, joints=None, lower=None, upper=None)
+    low, high = subject.start.copy(), subject.start.copy()
+    place = list(freedom.joints)
+    low[place], high[place] = freedom.low, freedom.high
+    rng = np.random.default_rng(0)
+    shares = [np.full((2, subject.robot.joints), share) for share in _EVEN]
+    shares += [rng.uniform(0.1, 1.0, (2, subject.robot.joints)) for _ in range(_RANDOM)]
+    start = subject.start
+    return [(start + one * (low - start), start + two * (high - start)) for one, two in shares]
+
+
 def _often_near(subject: Subject, targets: np.ndarray, effort: Effort) -> set[tuple[int, int]]:
     """Pairs that often come too near on random polygons which turn far about the targets' axes."""
     finder = _Finder(subject, subject.robot, None, effort)
@@ -135,11 +174,20 @@ class _ClearFirst(PolygonTable):
 class _Finder:
     """A search with some of a robot's pairs, whose answers count only with all pairs proven."""
 
-    def __init__(self, subject: Subject, few: reojax.Robot, margin: float | None, effort: Effort) -> None:
-        self.subject, self.few, self.margin, self.effort = subject, few, margin, effort
+    def __init__(
+        self,
+        subject: Subject,
+        few: reojax.Robot,
+        margin: float | None,
+        effort: Effort,
+        box: tuple[np.ndarray, np.ndarray] | tuple[None, None] = (None, None),
+        proof: float | None = None,
+    ) -> None:
+        self.subject, self.few, self.margin, self.effort, self.box = subject, few, margin, effort, box
+        self.proof = margin if proof is None else proof
         with jax.enable_x64(True):
             few = jax.tree.map(lambda leaf: np.asarray(leaf, float), few)
-            freedom = freedom_of(few, start=subject.start, end=None, joints=None, lower=None, upper=None)
+            freedom = freedom_of(few, start=subject.start, end=None, joints=None, lower=box[0], upper=box[1])
             corners = next(number for most, number in _CORNERS if len(freedom.joints) <= most)
             self.freedom, self.polygons = freedom, polygons_of(few, freedom, corners)
             self.table = table_of(self.polygons, freedom, key_of(few), 0)
@@ -161,10 +209,11 @@ class _Finder:
 
     def kept(self, paths: np.ndarray) -> np.ndarray:
         """Which paths (m,) are proven to keep the clearance, all pairs looked at; all of them if none is asked for."""
-        robot, margin = self.subject.robot, self.margin
+        robot, margin = self.subject.robot, self.proof
         if margin is None or not robot.collision_pairs:
             return np.full(len(paths), True)
-        return Clear(robot, margin).kept(paths)
+        apart = [float(reojax.path_clearance(robot, reojax.Path(path)).distance) for path in paths]
+        return np.array(apart) >= margin
 
     def improve(self, found: Turns, targets: np.ndarray, going: np.ndarray) -> np.ndarray:
         """Solve some of the targets; changes `found`, and returns all paths (n, v, j) that were tried."""
@@ -201,7 +250,7 @@ class _Finder:
     def _solve(self, found: Turns, targets: np.ndarray, mine: np.ndarray, runs: int) -> np.ndarray:
         answer = reojax.free_paths(
             self.few, targets[mine], start=self.subject.start, repeats=runs, clearance=self.margin,
-            starts=self.effort.starts, max_steps=self.effort.steps,
+            starts=self.effort.starts, max_steps=self.effort.steps, lower=self.box[0], upper=self.box[1],
         )  # fmt: skip
         reached = answer.converged & self.kept(answer.waypoints)
         for i, k in enumerate(mine):

@@ -8,7 +8,7 @@ import numpy as np
 from common.markdown import table
 
 import reojax
-from atlas_parts.clear_turns import Effort, Turns, clear_turns, free_turns
+from atlas_parts.clear_turns import Effort, Turns, boxed_turns, clear_turns, free_turns
 from atlas_parts.proof import prove
 from atlas_parts.store import Row, Store
 from atlas_parts.subjects import USUAL_AXES, Subject, subject
@@ -20,7 +20,7 @@ ANGLES = (180, 90)
 """Turns about each axis [deg]."""
 FEW = 5
 """Up to so many joints a search is cheap, and thorough."""
-THOROUGH, USUAL, QUICK = Effort(starts=4, steps=80), Effort(starts=2, steps=30), Effort(starts=1, steps=25)
+THOROUGH, USUAL, QUICK = Effort(starts=4, steps=80), Effort(starts=2, steps=40), Effort(starts=1, steps=25)
 LAWS = ("quintic", "trapezoid")
 
 
@@ -31,7 +31,7 @@ def turns(subject: Subject, *, quick: bool = False) -> Row:
     wanted = [(axis, angle) for axis in subject.axes for angle in (ANGLES[1:] if quick else ANGLES)]
     targets = np.array([np.asarray(so3.exp(np.deg2rad(angle) * subject.axes[axis])) for axis, angle in wanted])
     touching = free_turns(subject, targets, effort)
-    found = clear_turns(subject, targets, effort)
+    found = (clear_turns if subject.robot.joints <= FEW else boxed_turns)(subject, targets, effort)
     alone = Turns(*(part.copy() for part in found))
     for answers in (touching, found):
         _double(answers, wanted)
