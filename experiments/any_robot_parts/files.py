@@ -16,7 +16,8 @@ PACKAGES = {
 """Ending of the files, kind of place, and place."""
 
 _MOVES = re.compile(r"type=.(revolute|continuous|prismatic|spherical|floating|planar)")
-_BODIES = re.compile(r"<(body|include)\b")
+_BODIES = re.compile(r"<body\b")
+_INCLUDES = re.compile(r"<include\s+file=[\"']([^\"']+)")
 
 
 class Missing(ValueError):
@@ -24,7 +25,7 @@ class Missing(ValueError):
 
 
 def robot_files(package: str) -> list[Path]:
-    """Robot files of a package: URDFs with a joint that moves, MJCFs with a body.
+    """Robot files of a package: URDFs with a joint that moves, MJCFs with a body or an include that is there.
 
     Raises:
         Missing: if the package is not installed.
@@ -59,4 +60,5 @@ def _is_robot(file: Path) -> bool:
     text = file.read_text(errors="replace")
     if file.suffix == ".urdf":
         return bool(_MOVES.search(text))
-    return "<mujoco" in text.replace("<mujocoinclude", "") and bool(_BODIES.search(text))
+    there = any((file.parent / name).is_file() for name in _INCLUDES.findall(text))
+    return "<mujoco" in text.replace("<mujocoinclude", "") and (there or bool(_BODIES.search(text)))

@@ -63,10 +63,10 @@ def _try(file: Path) -> tuple[reojax.Robot | None, str]:
 
 
 def _locked(file: Path, reason: str) -> tuple[reojax.Robot | None, str]:
-    """What an equality constraint ties, locked at zero, until none is left."""
+    """What the refusal says to lock, at zero, until none is left."""
     lock: dict[str, float] = {}
-    while tied := re.search(r"equality constraint .* ties '(.+?)'", reason):
-        new = {joint: 0.0 for joint in tied[1].split(", ")}
+    while tied := re.search(r"equality constraint .* ties '(.+?)'|lock=\{'(.+?)': 0\} holds it", reason):
+        new = {joint: 0.0 for joint in (tied[1] or tied[2]).split(", ")}
         if new.keys() <= lock.keys():
             break
         lock |= new

@@ -14,6 +14,8 @@ from reojax._internal.inertias import NOISE, breaks_triangle
 
 _TOLERANCE = 1e-6
 """Relative rounding allowed in unit lengths, symmetry and the triangle rule (float32 data pass)."""
+_NAMED = 3
+"""Pairs of links that a note names."""
 _MANY_TURNS = 8 * np.pi
 """Limits beyond this are asked about [rad]."""
 
@@ -159,11 +161,7 @@ def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str,
     fields["notes"] = (*map(str, entries["notes"]), *check_energy(fields))
     if entries["collision_pairs"] is None:
         fields["collision_pairs"], touching = default_pairs(fields)
-        fields["notes"] += tuple(
-            f"capsules {a} and {b} ({fields['link_names'][fields['capsule_link'][a]]}, "
-            f"{fields['link_names'][fields['capsule_link'][b]]}) touch at rest: not kept apart"
-            for a, b in touching
-        )
+        fields["notes"] += _touching(touching, [fields["link_names"][i] for i in fields["capsule_link"]])
     else:
         fields["collision_pairs"] = check_pairs(entries["collision_pairs"], fields["capsule_link"])
     fields["layout"] = entries["layout"]
@@ -171,3 +169,14 @@ def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str,
         if isinstance(field, np.ndarray):
             field.setflags(write=False)
     return fields
+
+
+def _touching(pairs: Sequence[tuple[int, int]], links: Sequence[str]) -> tuple[str, ...]:
+    """A note that says how many pairs of capsules touch at rest, and on which links, given each capsule's."""
+    between = list(dict.fromkeys(f"{shorten(links[a])} and {shorten(links[b])}" for a, b in pairs))
+    if not between:
+        return ()
+    named = ", ".join(between[:_NAMED])
+    more = f", and of {len(between) - _NAMED} more pairs of links" if len(between) > _NAMED else ""
+    what = "1 pair of capsules touches" if len(pairs) == 1 else f"{len(pairs)} pairs of capsules touch"
+    return (f"{what} at rest, and so not kept apart: of {named}{more}",)

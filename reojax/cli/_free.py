@@ -72,15 +72,19 @@ def posture(option: str, text: str, robot: "Robot") -> "np.ndarray":
                 f"{robot.name!r} has {robot.joints} joints: {names}."
             )
         return np.deg2rad([_degrees(option, part) for part in parts])
-    theta = np.zeros(robot.joints)
+    theta, named = np.zeros(robot.joints), set()
     for part in parts:
         name, equals, angle = part.partition("=")
         if not equals or name not in robot.joint_names:
             known = ", ".join(robot.joint_names)
             raise ValueError(f"argument {option}: {part!r} must be JOINT=DEGREES; the joints are {known}.")
+        if name in named:
+            raise ValueError(f"argument {option}: joint {name!r} is named twice.")
+        named.add(name)
         theta[robot.joint_names.index(name)] = np.deg2rad(_degrees(option, angle))
     for k, (joint, driver) in enumerate(robot.couplings):
-        theta[joint] = robot.coupling_ratio[k] * theta[driver] + robot.coupling_offset[k]
+        if robot.joint_names[joint] not in named:
+            theta[joint] = robot.coupling_ratio[k] * theta[driver] + robot.coupling_offset[k]
     return theta
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from reojax.cli._arguments import degrees
 from reojax.cli._plan_file import add_plan_file, saved_plan
-from reojax.cli._robot import add_robot, robot_of
+from reojax.cli._robot import add_robot, layout_of, robot_of
 
 if TYPE_CHECKING:
     from reojax.path import Path
@@ -63,14 +63,12 @@ def path_of(robot: "Robot", args: argparse.Namespace) -> "Path":
     import numpy as np
 
     from reojax.manoeuvres import BY_NAME
-    from reojax.robot import layout_of
 
     return BY_NAME[args.manoeuvre](np.deg2rad(args.twist), np.deg2rad(args.bend), layout_of(robot))
 
 
 def edge_names(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[str, ...]:
     """What the robot does on each edge of a manoeuvre, or the number of each edge of a plan."""
-    from reojax.robot import layout_of
 
     if args.plan is not None:
         return tuple(f"edge {k}" for k in range(1, path.edges + 1))

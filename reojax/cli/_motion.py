@@ -5,7 +5,7 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 from reojax._internal.display_units import RPM
-from reojax.cli._motors import motor_at
+from reojax.cli._motors import motor_of
 from reojax.cli._planned import durations_of
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def motion_of(robot: "Robot", path: "Path", args: argparse.Namespace) -> "Motion
             path,
             args.law or LAW,
             durations=durations,
-            motors=motor_at(args.supply),
+            motors=motor_of(robot, args),
             momentum=args.momentum,
         )
     if motion.error is not None and float(motion.error) > _RESOLVED:

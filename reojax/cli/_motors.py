@@ -8,6 +8,7 @@ from reojax.cli._arguments import LONGEST, SHORTEST
 
 if TYPE_CHECKING:
     from reojax.motion.motor import Motor
+    from reojax.robot import Robot
 
 WEAKEST = 1e-3
 """Weakest supply at the command line [V]; no motor moves by less."""
@@ -18,7 +19,10 @@ def add_motors(parser: argparse.ArgumentParser, *, law: str | None) -> None:
     laws = "quintic, trapezoid or minimum-jerk"
     default = "" if law is None else " [%(default)s]"
     parser.add_argument("--law", default=law, metavar="NAME", help=f"time law of every edge: {laws}{default}")
-    parser.add_argument("--supply", type=volts, default=12.0, metavar="V", help="supply of the motors [%(default)g]")
+    add = parser.add_argument
+    add("--supply", type=volts, default=12.0, metavar="V", help="supply of the motors [%(default)g]")
+    add("--resistance", type=_winding, metavar="OHM", help="of the motors' windings [the RE-max 17's, 8.3]")
+    add("--torque-constant", type=_winding, metavar="NM/A", help="of the motors [the RE-max 17's, 0.0107]")
 
 
 def volts(text: str) -> float:
@@ -42,11 +46,19 @@ def momentum(text: str) -> list[float]:
     return numbers
 
 
-def motor_at(supply: float) -> "Motor":
-    """The prototype's motor at a supply [V]."""
+def motor_of(robot: "Robot", args: argparse.Namespace) -> "Motor":
+    """The prototype's motor, or one of another winding, with the rotors and gears that the robot has."""
     from reojax.motion.motor import RE_MAX_17
 
-    return RE_MAX_17._replace(supply=supply)
+    given = {"resistance": args.resistance, "torque_constant": args.torque_constant}
+    winding = {key: value for key, value in given.items() if value is not None}
+    return RE_MAX_17._replace(
+        supply=args.supply, rotor_inertia=robot.rotor_inertia, gear_ratio=robot.gear_ratio, **winding
+    )
+
+
+def _winding(text: str) -> float:
+    return in_range(text, "a number of a winding", 1e-6, 1e6)
 
 
 def in_range(text: str, what: str, least: float, most: float) -> float:

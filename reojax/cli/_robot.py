@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from reojax.manoeuvres import Layout
     from reojax.robot import Robot
 
 _ENDINGS = (".urdf", ".xml", ".mjcf", ".json")
@@ -32,6 +33,20 @@ def robot_of(name: str) -> "Robot":
         return load_robot(name)
     except ImportError as error:  # it says what to install
         raise ValueError(str(error)) from None
+
+
+def layout_of(robot: "Robot") -> "Layout":
+    """The robot's own layout, which manoeuvres need.
+
+    Raises:
+        ValueError: if it has none, saying what works without.
+    """
+    if robot.layout is None:
+        raise ValueError(
+            f"{robot.name!r} has no layout of its own, which manoeuvres need; "
+            "`reojax plan --robot ... --save PLAN.json` finds a path for any robot, and --plan PLAN.json runs it."
+        )
+    return robot.layout
 
 
 def is_file(name: str) -> bool:

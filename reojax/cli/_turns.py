@@ -8,10 +8,11 @@ import numpy as np
 
 from reojax import so3
 from reojax._internal.arrays import Array
+from reojax.cli._robot import layout_of
 from reojax.manoeuvres import BY_NAME
 from reojax.mechanics.holonomy import DEFAULT_STEPS, rotation_history
 from reojax.path import joint_travel
-from reojax.robot import Robot, layout_of
+from reojax.robot import Robot
 from reojax.robots import with_end_inertia, with_gear_ratio, with_rotor_inertia
 
 _RESOLVED = np.deg2rad(270)

@@ -63,11 +63,27 @@ def _plan(name: str) -> "SavedPlan | None":
 def _plan_report(plan: "SavedPlan") -> dict[str, Any]:
     import numpy as np
 
+    from reojax import so3
+
+    def vector(rotation: "np.ndarray") -> list[float]:
+        return np.rad2deg(np.asarray(so3.log(rotation))).tolist()
+
+    clearance = None if plan.clearance is None or not np.isfinite(plan.clearance) else float(plan.clearance)
     return {
         "corners": len(plan.waypoints),
         "runs": int(plan.repeats),
+        "manoeuvres": [name for name, *_ in plan.manoeuvres],
         "travel_deg": float(np.rad2deg(plan.travel)),
+        "target_rotation_vector_deg": None if plan.target is None else vector(plan.target),
+        "rotation_vector_deg": vector(plan.rotation),
         "error_rad": float(plan.error),
+        "converged": plan.converged,
+        "status": plan.status,
+        "clearance_m": clearance,
+        "certificate": None
+        if plan.certificate is None
+        else {k: float(v) for k, v in plan.certificate._asdict().items()},
+        "planned_by": plan.reojax,
     }
 
 
@@ -203,10 +219,7 @@ def _text(robot: "Robot", report: dict[str, Any]) -> str:
     ):
         lines.append(f"  {label:<10}{check[key]:>9.1e}  {meaning}")
     if "plan" in report:
-        plan = report["plan"]
-        runs = f", run {plan['runs']} times" if plan["runs"] > 1 else ""
-        travel, error = plan["travel_deg"], plan["error_rad"]
-        lines += ["", f"plan: {plan['corners']} corners{runs}, {travel:.1f} deg of joint travel, {error:.1e} rad off"]
+        lines += ["", *_plan_text(report["plan"])]
     if report["clearance"] is None:
         lines += ["", "clearance: none, as there are no pairs of shapes to keep apart"]
     else:
@@ -222,3 +235,20 @@ def _clearance_text(found: dict[str, Any]) -> str:
     place = "joints at zero" if found["of"] == "robot" else f"{found['at_edge']:.3f} edges along the plan"
     points = " and ".join("(" + ", ".join(f"{1e3 * x:.1f}" for x in point) + ")" for point in found["nearest_points_m"])
     return f"clearance: least {how}, between {found['pair']}, {place}; nearest points {points} mm, base frame"
+
+
+def _plan_text(plan: dict[str, Any]) -> list[str]:
+    runs = f", run {plan['runs']} times" if plan["runs"] > 1 else ""
+    word = f" of {''.join(plan['manoeuvres'][:24])}" if plan["manoeuvres"] else ""
+    turn = lambda vector: "({:.6g}, {:.6g}, {:.6g}) deg".format(*(round(x, 9) + 0.0 for x in vector))
+    lines = [f"plan{word}: {plan['corners']} corners{runs}, {plan['travel_deg']:.1f} deg of joint travel"]
+    if plan["target_rotation_vector_deg"] is not None:
+        lines.append(f"  target     rotation vector {turn(plan['target_rotation_vector_deg'])}")
+    lines.append(f"  base turns rotation vector {turn(plan['rotation_vector_deg'])}")
+    lines.append(f"  status     {plan['status']}, {plan['error_rad']:.1e} rad off")
+    if plan["clearance_m"] is not None:
+        lines.append(f"  clearance  {1000 * plan['clearance_m']:.4g} mm, proven")
+    if plan["certificate"] is not None:
+        figures = plan["certificate"]
+        lines.append(f"  momentum   {figures['momentum']:.1e} at most, as a share of what the links exchange")
+    return lines

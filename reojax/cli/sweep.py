@@ -13,7 +13,7 @@ from reojax.cli._axes import AXES, axis, check_names
 from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_amplitudes
 from reojax.cli._results import add_files, check_files, complaint, table, write
-from reojax.cli._robot import add_robot, robot_of
+from reojax.cli._robot import add_robot, layout_of, robot_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -89,7 +89,6 @@ def run(args: argparse.Namespace) -> None:
 def _outermost(robot: "Robot", manoeuvre: str, amplitudes: dict[str, "np.ndarray"]) -> list["Path"]:
     """The manoeuvre at the least and at the largest amplitudes: no design goes farther, either way."""
     from reojax.manoeuvres import BY_NAME
-    from reojax.robot import layout_of
 
     twist, bend = amplitudes["twist"], amplitudes["bend"]
     ends = ((twist.min(), bend.min()), (twist.max(), bend.max()))

@@ -10,7 +10,7 @@ from reojax.cli._arguments import BadInput, version
 from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
 from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path
-from reojax.cli._motors import add_motors, motor_at
+from reojax.cli._motors import add_motors, motor_of
 
 if TYPE_CHECKING:
     from reojax.motion.simulation import Motion
@@ -60,7 +60,7 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
     from reojax.motion.least_time import AVAILABLE, FALL, minimum_time
     from reojax.motion.simulation import simulate
 
-    motors = motor_at(args.supply)
+    motors = motor_of(robot, args)
     least = minimum_time(robot, path, motors, args.law)
     durations = np.asarray(least.durations)
     if not durations.sum() > 0:
@@ -93,6 +93,8 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
             "bend_deg": args.bend,
             "law": args.law,
             "supply_V": args.supply,
+            "resistance_ohm": args.resistance,
+            "torque_constant_Nm_A": args.torque_constant,
         },
         "edges": edges,
         "duration_s": total,
@@ -105,6 +107,8 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
     return report, motion
 
 
+_TOLD = 24
+"""Most edges that are printed one by one; JSON has all of them."""
 _PEAKS = {
     "torque": "peak_joint_torque_Nm",
     "theta_dot": "peak_joint_rate_rad_s",
@@ -119,7 +123,7 @@ def _draw(robot: "Robot", motion: "Motion", report: dict[str, Any], args: argpar
 
     title = f"{heading(args)}, {args.law}, {args.supply:g} V".replace(" deg", "°").replace(" -", " \u2212")
     runs = [(f"{1000 * report['duration_s']:.0f} ms in all", motion)]
-    figure = plot.torque_speed_figure(motor_at(args.supply), runs, joint_names=robot.joint_names, title=title)
+    figure = plot.torque_speed_figure(motor_of(robot, args), runs, joint_names=robot.joint_names, title=title)
     plot.save(figure, args.out)
 
 
@@ -129,7 +133,7 @@ def _text(report: dict[str, Any], args: argparse.Namespace) -> str:
         "",
         "  edge       least time  set by     at    torque     joint rate   motor speed   current",
     ]
-    for edge in report["edges"]:
+    for edge in report["edges"][:_TOLD]:
         if edge["joint"] is None:
             lines.append(f"  {edge['edge']:<9}{0.0:>9.1f} ms  nothing moves")
             continue
@@ -138,6 +142,8 @@ def _text(report: dict[str, Any], args: argparse.Namespace) -> str:
             f"{edge['peak_joint_torque_Nm']:>8.3f} N m{edge['peak_joint_rate_rad_s']:>8.1f} rad/s"
             f"{edge['peak_motor_speed_rad_s'] * RPM:>8.0f} rpm{edge['peak_current_A']:>8.2f} A"
         )
+    if len(report["edges"]) > _TOLD:
+        lines.append(f"  ... and {len(report['edges']) - _TOLD} more")
     verdict = "fits into" if report["fits"] else "does not fit into"
     lines += [
         f"  {'in all':<9}{1000 * report['duration_s']:>9.1f} ms",

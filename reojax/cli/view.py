@@ -23,8 +23,9 @@ _HOUR = 3600
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `reojax view`."""
     add = parser.add_argument
-    add("plan", nargs="?", metavar="PLAN.json", help="what `reojax plan --save` wrote or --json printed")
-    add_manoeuvre(parser, plan=False)
+    text = "what `reojax plan --save` wrote or --json printed; --plan means the same"
+    add("plan", nargs="?", default=argparse.SUPPRESS, metavar="PLAN.json", help=text)
+    add_manoeuvre(parser)
     add("--duration", type=seconds, metavar="S", help="run it in this time, by a quintic law")
     add("--beside", metavar="PLAN.json", help="another plan for the same robot, shown beside it")
     add_clearance(parser, "proven along the whole path and marked where it is least, or exit 1")

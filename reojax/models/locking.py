@@ -81,7 +81,9 @@ def couple(
             continue
         driver, ratio, offset = joint.mimic
         if driver not in joints:
-            raise ValueError(f"joint {shorten(name)} mimics {shorten(driver)}, which is not there")
+            raise ValueError(
+                f"joint {shorten(name)} mimics {shorten(driver)}, which is not there: lock={{{name!r:.60}: 0}} holds it"
+            )
         seen = {name}
         while driver in joints and driver not in lock and joints[driver].mimic is not None:
             if driver in seen:

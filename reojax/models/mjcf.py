@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,9 @@ import numpy as np
 from reojax._internal.checks import shorten
 from reojax._internal.definiteness import turn_about
 from reojax.models.description import Description, JointEntry, Kind, LinkEntry, Shape, rotation_of_quaternion
+from reojax.models.mjcf_names import without_repeated_names
 
+_TWICE = re.compile(r"repeated name .* in (texture|material|geom|light|camera)")
 _CAREFUL = ("balanceinertia", "settotalmass")
 """Settings of a file that change its inertias: told."""
 
@@ -53,7 +56,7 @@ def _compile(path: str | os.PathLike[str], notes: list[str]) -> Any:
     except ImportError as error:
         raise ImportError('reading MJCF needs MuJoCo: pip install "reojax[models]"') from error
     try:
-        spec = mujoco.MjSpec.from_file(os.fspath(path))
+        spec = _spec(mujoco, path, notes)
         spec.compiler.fusestatic = False
         try:
             return spec.compile()
@@ -62,6 +65,18 @@ def _compile(path: str | os.PathLike[str], notes: list[str]) -> Any:
             return spec.compile()
     except (ValueError, RuntimeError, FileNotFoundError) as error:
         raise ValueError(f"MuJoCo does not take it: {' '.join(str(error).split())[:400]}") from None
+
+
+def _spec(mujoco: Any, path: str | os.PathLike[str], notes: list[str]) -> Any:
+    """The file as MuJoCo reads it, where names of pictures and shapes come twice without them."""
+    try:
+        return mujoco.MjSpec.from_file(os.fspath(path))
+    except ValueError as error:
+        if not _TWICE.search(str(error)):
+            raise
+    text, parts = without_repeated_names(Path(path))
+    notes.append("textures, materials and names of shapes left out: the file and those it includes give some twice")
+    return mujoco.MjSpec.from_string(text, include=parts)
 
 
 def _strip(spec: Any, folder: Path, notes: list[str]) -> None:

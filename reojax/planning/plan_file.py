@@ -88,8 +88,8 @@ def save_plan(
 ) -> None:
     """Write one plan or free path as JSON, with the robot and a certificate that is computed now.
 
-    `load_plan` reads it back, and so do `reojax simulate`, `time`, `export` and `view`. The file is written whole or
-    not at all.
+    `load_plan` reads it back, and so do `reojax show`, `simulate`, `time`, `export` and `view`. The file is written
+    whole or not at all.
 
     Args:
         plan: of `plan`, `replan` or `free_path`.

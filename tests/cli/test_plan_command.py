@@ -1,5 +1,6 @@
 """`reojax plan`: files that replay, exit statuses, one line for a bad target; the words of many small loops."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.spatial.transform import Rotation
 import reojax
 from reojax import robots
 from reojax.cli import main
+from reojax.cli._free import posture
 from reojax.cli.plan import read_target
 
 QUARTER = Rotation.from_rotvec([0, np.pi / 2, 0]).as_matrix()
@@ -91,6 +93,7 @@ def test_a_bad_target_is_one_line_and_status_2(capsys, monkeypatch, tmp_path, ta
         ("--robot", "missing.urdf", "missing.urdf"),
         ("--from", "0,1", "argument --from: '0,1' has 2 angles; 'prototype' has 3 joints: twist1, bend, twist2"),
         ("--from", "elbow=3", "argument --from: 'elbow=3' must be JOINT=DEGREES; the joints are twist1, bend, twist2"),
+        ("--from", "bend=3,bend=4", "argument --from: joint 'bend' is named twice"),
         ("--to", "0,1,x", "argument --to: 'x' is not an angle in degrees"),
         ("--joints", "elbow", "`joints[0]` is 'elbow'"),
         ("--repeats", "many", "argument --repeats: 'many' must be a whole number, or `least`"),
@@ -101,6 +104,18 @@ def test_a_bad_target_is_one_line_and_status_2(capsys, monkeypatch, tmp_path, ta
 def test_bad_options(capsys, option, value, message):
     assert main(["plan", "--target", "rotvec 0 0 90", option, value]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_joints_that_follow_others_go_where_these_take_them_unless_they_are_named():
+    """What is named stays as it is, for the planner to refuse."""
+    robot = dataclasses.replace(
+        robots.planar(4), couplings=((2, 0),), coupling_ratio=np.array([-2.0]), coupling_offset=np.array([0.1])
+    )
+    first, _, last = robot.joint_names
+    np.testing.assert_allclose(posture("--from", f"{first}=30", robot), [np.pi / 6, 0, 0.1 - np.pi / 3])
+    np.testing.assert_allclose(posture("--from", f"{first}=30,{last}=6", robot), np.deg2rad([30, 0, 6]))
+    with pytest.raises(ValueError, match=f"`start` has joint {last!r} at 0.1047.* it follows {first!r}"):
+        reojax.free_path(robot, np.eye(3), start=posture("--from", f"{last}=6", robot))
 
 
 def test_words_need_a_layout_and_free_paths_have_options_of_their_own(capsys):

@@ -186,6 +186,29 @@ def test_missing_textures_and_meshes_of_pictures_do_not_matter(tmp_path):
     assert "inertia from mesh 'mesh'" in refusal(tmp_path, f'<body name="a"><freejoint/>{shown}</body>', assets)
 
 
+def test_names_of_pictures_and_shapes_that_come_twice_do_not_matter(tmp_path):
+    """As in dm_control's dog: a scene and the robot that it includes both define the floor and its texture."""
+    asset = '<asset><texture name="grid" type="2d" builtin="flat" width="9" height="9"/>'
+    asset += '<material name="grid" texture="grid"/>{}</asset>'
+    body = f'<body name="a">{BOX.format(900)}<body name="b" pos="0 0 1"><joint name="j" axis="0 1 0"/>'
+    body += f'{BOX.format(500)}<geom type="mesh" mesh="m" material="grid" mass="0"/></body></body>'
+    mesh, floor = '<mesh name="m" file="m.obj"/>', '<geom name="floor" type="plane" size="1 1 1"/>'
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "m.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    part = f'<mujoco><compiler meshdir="meshes"/>{asset.format(mesh)}<worldbody>{floor}{body}</worldbody></mujoco>'
+    (tmp_path / "part.xml").write_text(part)
+    robot = load(tmp_path, floor, asset.format("") + '<include file="part.xml"/>')
+    assert (robot.link_names, robot.joint_names) == (("a", "b"), ("j",))
+    assert len(robot.capsules) == 3
+    assert any(note.startswith("textures, materials and names of shapes left out") for note in robot.notes)
+    plain = load(
+        tmp_path, body.replace(' material="grid"', ""), f"<asset>{mesh.replace('m.obj', 'meshes/m.obj')}</asset>"
+    )
+    np.testing.assert_array_equal(robot.inertia, plain.inertia)
+
+
 @pytest.mark.parametrize(
     ("body", "words"),
     [

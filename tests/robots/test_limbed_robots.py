@@ -7,6 +7,7 @@ import reojax
 from reojax import robots
 from reojax._internal.capsule_checks import segment_distance
 from reojax.mechanics.kinematics import kinematics
+from reojax.robots.astronaut import HEAD, TRUNK
 
 LIMBED = ("satellite_arm", "quadruped", "astronaut")
 MIRROR = np.diag([1.0, -1.0, 1.0])
@@ -34,6 +35,17 @@ def test_the_astronaut_has_the_mass_and_the_height_of_de_leva_s_subjects():
     assert man.mass.sum() == pytest.approx(73.0)
     feet = kinematics(man, np.zeros(14)).origin[man.link_names.index("left_shank"), 2] - 0.434 - 0.045
     assert 0.8462 - float(feet) == pytest.approx(1.741, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("segment", "length", "centre", "radii"),
+    [(HEAD, 0.2429, 50.02, (30.3, 31.5, 26.1)), (TRUNK, 0.6033, 51.38, (32.8, 30.6, 16.9))],
+)
+def test_head_and_trunk_agree_with_de_leva_s_other_end_points(segment, length, centre, radii):
+    """His table has both twice, also with the seventh neck vertebra as an end, 71.4 mm over the sternum's."""
+    over = 0.0 if segment is HEAD else length - segment.length
+    assert centre / 100 * length - over == pytest.approx(segment.centre / 100 * segment.length, abs=1e-4)
+    np.testing.assert_allclose(length * np.array(radii), segment.length * np.array(segment.radii), rtol=5e-3)
 
 
 @pytest.mark.parametrize("name", ["quadruped", "astronaut"])

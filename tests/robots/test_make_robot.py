@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from reojax import Robot, make_robot, momentum_matrices
+from reojax import Capsule, Robot, make_robot, momentum_matrices
 
 GOOD = {
     "mass": [2.0, 1.0, 0.5],
@@ -218,6 +218,16 @@ def test_limits_of_many_turns_are_asked_about():
     with pytest.warns(UserWarning, match=r"lower\[0\] \(shoulder\) is -170 rad, 27.1 turns: are these degrees"):
         make_robot(**GOOD | {"lower": [-170.0, -2.0]})
     make_robot(**GOOD | {"lower": [-20.0, -np.inf], "upper": [20.0, np.inf]})
+
+
+def test_pairs_that_touch_at_rest_are_told_in_one_note():
+    """Six spheres of links in a row, all at the same place: ten pairs of links that are not joined directly."""
+    spheres = [Capsule(i, (0, 0, 0), (0, 0, 0), 1.0) for i in range(6)]
+    chain = {"axis": [(0, 0, 1)] * 5, "anchor": [(0.01, 0, 0)] * 5, "com": np.zeros((6, 3))}
+    robot = make_robot(mass=np.ones(6), inertia=[np.eye(3)] * 6, **chain, capsules=spheres)
+    (note,) = robot.notes
+    assert note.startswith("10 pairs of capsules touch at rest, and so not kept apart: of 'link0' and 'link2', ")
+    assert note.endswith(", and of 7 more pairs of links")
 
 
 @pytest.mark.parametrize("entry", [*GOOD, "capsules", "collision_pairs", "couplings", "notes"])
