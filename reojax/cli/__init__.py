@@ -13,8 +13,10 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
+from reojax._internal.version import version
 from reojax.cli import compare, export, merge, plan, show, simulate, sweep, time, view
-from reojax.cli._arguments import BadInput, Parser, join_negative_values, version
+from reojax.cli._arguments import BadInput, Parser, join_negative_values
+from reojax.cli._numbers import in_degrees
 
 COMMANDS = {
     "simulate": simulate,
@@ -43,7 +45,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         args.run(args)
         sys.stdout.flush()
     except BadInput as error:
-        _tell(str(error))
+        _tell(in_degrees(str(error)))
         return 2
     except SystemExit as stop:  # argparse, after --help and --version; a subcommand whose result is not all there
         return _flush() or int(stop.code or 0)

@@ -71,7 +71,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         {"robot": PROTOTYPE, "trajectory": TRAJECTORY, "release": reojax.Release(), "steps": 4, "substeps": None},
     ),
     "release.momentum": (
-        lambda momentum, drag: reojax.released(PROTOTYPE, TRAJECTORY, reojax.Release(momentum, drag=drag), steps=4),
+        lambda momentum, drag: reojax.released(PROTOTYPE, TRAJECTORY, reojax.Release(momentum, drag=drag), samples=4),
         {"momentum": (0.0, 0.0, 1e-4), "drag": 1e-6},
     ),
     "minimum_time": (
