@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from common.script import options, run
 from matplotlib.figure import Figure
@@ -49,7 +48,7 @@ def proven(paths: np.ndarray) -> np.ndarray:
 
 @jax.jit
 def _least(corners: jax.Array) -> jax.Array:
-    return jax.vmap(lambda points: jnp.asarray(reojax.path_clearance(ROBOT, reojax.Path(points)).distance))(corners)
+    return jax.vmap(lambda points: reojax.path_clearance(ROBOT, reojax.Path(points)).distance)(corners)
 
 
 def maps(quick: bool) -> dict:

@@ -23,8 +23,8 @@ def main() -> NoReturn:
     from reojax.cli import main as run
 
     status = run()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done and said; Python's end would take it for its default
     if status == 130:  # threads of XLA may be computing, which must not outlive Python: end them with the process
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
         os._exit(130)
     sys.exit(status)
 
@@ -36,7 +36,7 @@ def _end(*_: Any) -> NoReturn:
         for file in [*getattr(work, "unfinished", ())]:
             file.unlink(missing_ok=True)
         line = "; ".join(["reojax: interrupted", *getattr(work, "notes", ())])
-        below = "\n" if os.isatty(2) else ""  # a bar may stand there
+        below = "\n" if os.isatty(2) or getattr(work, "notes", ()) else ""  # a bar may stand there
         os.write(2, f"{below}{line}\n".encode())
     except OSError:
         pass

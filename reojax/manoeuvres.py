@@ -16,6 +16,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array, as_numbers, is_concrete
+from reojax._internal.checks import numbers, shorten, whole
 from reojax.path import Path, polygon
 
 
@@ -120,7 +121,7 @@ def _manoeuvre(name: str, twist: ArrayLike, bend: ArrayLike, layout: Layout) -> 
 def _amplitude(entry: str, value: ArrayLike) -> Array:
     number = as_numbers(entry, value)
     if number.shape:
-        raise ValueError(f"`{entry}` is {value!r}; it must be one real number, in radians.")
+        raise ValueError(f"`{entry}` is {shorten(value)}; it must be one real number, in radians.")
     if is_concrete(number) and not np.isfinite(number):
         raise ValueError(f"`{entry}` is {value}; it must be finite.")
     return number
@@ -129,10 +130,20 @@ def _amplitude(entry: str, value: ArrayLike) -> Array:
 def check_layout(layout: Layout) -> None:
     """Raise a `ValueError` for a layout that contradicts itself."""
     if not isinstance(layout, Layout):
-        raise ValueError(f"`layout` is {layout!r}; it must be a Layout, such as FOUR_BODY.")
+        raise ValueError(f"`layout` is {shorten(layout)}; it must be a Layout, such as FOUR_BODY.")
+    joints = whole("layout.joints", layout.joints, 3, 10**4)
+    for entry in ("twist", "fold"):
+        pair = getattr(layout, entry)
+        if not isinstance(pair, tuple | list) or len(pair) != 2:
+            if entry == "twist" or pair is not None:
+                raise ValueError(f"`layout.{entry}` is {shorten(pair)}; it must be two joints.")
+    if layout.fold is not None:
+        numbers("layout.fold_angle", layout.fold_angle, (2,))
     used: Sequence[int] = (*layout.twist, layout.bend, *(layout.fold or ()))
     for joint in used:
-        if not 0 <= joint < layout.joints:
+        if isinstance(joint, bool) or not isinstance(joint, int | np.integer):
+            raise ValueError(f"the layout names joint {shorten(joint)}; joints go by their numbers.")
+        if not 0 <= joint < joints:
             raise ValueError(f"the layout names joint {joint}; its robot has joints 0 to {layout.joints - 1}.")
     if len(set(used)) != len(used):
         raise ValueError(f"the layout uses joints {tuple(used)}; each joint may play only one part.")

@@ -17,12 +17,13 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array, is_concrete
+from reojax._internal.checks import did_you_mean, instance
 from reojax._internal.entries import Entries
 from reojax._internal.replacements import replacement
 from reojax._internal.robot_checks import check_robot
 from reojax._internal.robot_table import one_line, table
 from reojax.capsules import Capsule
-from reojax.manoeuvres import Layout
+from reojax.manoeuvres import Layout, check_layout
 
 Side = Literal["parent", "child"]
 
@@ -140,8 +141,13 @@ class Robot:
         known = {field.name for field in dataclasses.fields(self)}
         for key, value in fields.items():
             if key not in known:
-                raise ValueError(f"a robot has no field {key!r}; its fields are {', '.join(sorted(known))}.")
+                raise ValueError(
+                    f"a robot has no field {key!r}; its fields are {', '.join(sorted(known))}."
+                    + did_you_mean(key, known)
+                )
             fields[key] = replacement(self, key, value)
+            if key == "layout" and value is not None:
+                check_layout(value)
         return dataclasses.replace(self, **fields)
 
     def __repr__(self) -> str:
@@ -210,6 +216,8 @@ def make_robot(
     Raises:
         ValueError: naming the entry, its value and the rule it breaks.
     """
+    if layout is not None:
+        check_layout(layout)
     return Robot(
         **check_robot(
             mass=mass,
@@ -241,6 +249,7 @@ def layout_of(robot: Robot) -> Layout:
     Raises:
         ValueError: if it has none.
     """
+    instance("robot", robot, Robot, "`make_robot` makes")
     if robot.layout is None:
         raise ValueError(
             f"{robot.name!r} has no layout of its own: pass `layout=Layout(joints, twist, bend)` that names its twist "

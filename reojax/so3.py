@@ -23,7 +23,8 @@ from jax import lax
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._internal.arrays import Array
+from reojax._internal.arrays import Array, refuse_lookalikes
+from reojax._internal.checks import shorten
 from reojax._internal.quaternions import outer_rows
 
 
@@ -224,10 +225,11 @@ def random(key: jax.Array, dtype: type | np.dtype = float) -> Float[Array, "3 3"
 
 def _floats(value: ArrayLike | float | int, name: str, shape: tuple[int, ...]) -> jax.Array:
     """Return `value` as a floating array, or raise a ValueError that names it."""
+    refuse_lookalikes(name, value)
     try:
         array = jnp.asarray(value)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"`{name}` must be an array of numbers of shape {shape}; got {value!r}.") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"`{name}` must be an array of numbers of shape {shape}; got {shorten(value)}.") from error
     if array.shape != shape:
         raise ValueError(f"`{name}` has shape {array.shape}; it must be {shape}.")
     if jnp.issubdtype(array.dtype, jnp.complexfloating):

@@ -193,7 +193,7 @@ class _Finder:
             self.table = table_of(self.polygons, freedom, key_of(few), 0)
             clear = None
             if margin is not None:
-                clear = Clear(few, margin, np.asarray(reojax.clearance(few, subject.start), float))
+                clear = Clear(few, margin)
                 self.table = _ClearFirst(*self.table)
                 self.table.kept = lambda x: clear.kept(self.polygons.paths(x, freedom))
             self.search = Search(self.polygons, self.table, freedom, effort.starts, effort.steps, 1e-9, clear)

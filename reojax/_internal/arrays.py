@@ -1,5 +1,6 @@
 """The array types of every signature, and the one rule for the dtype of a result."""
 
+import datetime
 from collections.abc import Callable
 from typing import Any
 
@@ -41,6 +42,24 @@ def is_concrete(value: Any) -> bool:
     return not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(value))
 
 
+def refuse_lookalikes(entry: str, value: Any) -> None:
+    """Refuse what NumPy would take for a number without a word: truth values, times, masked entries, other units.
+
+    Raises:
+        ValueError: naming `entry`.
+    """
+    if hasattr(value, "units") and hasattr(value, "magnitude"):
+        raise ValueError(f"`{entry}` is {_short(value)}, with units of its own; give its number in SI units.")
+    for leaf in jax.tree.leaves(value):
+        if isinstance(leaf, np.ma.MaskedArray) and np.ma.getmaskarray(leaf).any():
+            raise ValueError(f"`{entry}` has masked entries, which would count; leave them out, or fill them.")
+        kind = getattr(getattr(leaf, "dtype", None), "kind", "")
+        if isinstance(leaf, bool) or kind == "b":
+            raise ValueError(f"`{entry}` is {_short(value)}, with truth values in it; only real numbers will do.")
+        if kind in ("m", "M") or isinstance(leaf, datetime.timedelta | datetime.date):
+            raise ValueError(f"`{entry}` is {_short(value)}, a time of its own kind; give a number of seconds.")
+
+
 def as_numbers(entry: str, value: Any) -> Array:
     """Return `value` as an array of real numbers (integers become floats), traced or not.
 
@@ -48,11 +67,8 @@ def as_numbers(entry: str, value: Any) -> Array:
         ValueError: naming `entry`, if it is anything else: truth values, times, numbers with units, masked entries, or
             floats that are neither float32 nor float64.
     """
+    refuse_lookalikes(entry, value)
     leaves = jax.tree.leaves(value)
-    if any(isinstance(leaf, np.ma.MaskedArray) and np.ma.getmaskarray(leaf).any() for leaf in leaves):
-        raise ValueError(f"`{entry}` has masked entries, which would count; leave them out, or fill them.")
-    if hasattr(value, "units") and hasattr(value, "magnitude"):
-        raise ValueError(f"`{entry}` is {_short(value)}, with units of its own; give its number in SI units.")
     on_device = any(isinstance(leaf, jax.Array) for leaf in leaves)
     try:
         array = jnp.asarray(value) if on_device else np.asarray(value)
@@ -60,8 +76,6 @@ def as_numbers(entry: str, value: Any) -> Array:
         raise ValueError(f"`{entry}` is {_short(value)}; only real numbers will do.") from error
     if array.dtype.kind in "iu":
         return array.astype(float)
-    if array.dtype.kind in "mM":
-        raise ValueError(f"`{entry}` is {_short(value)}, a time of its own kind; give a number of seconds.")
     if not jnp.issubdtype(array.dtype, jnp.floating):
         raise ValueError(f"`{entry}` is {_short(value)}; only real numbers will do.")
     if array.dtype not in (np.float32, np.float64):

@@ -5,6 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from reojax._internal.arrays import as_numbers
+from reojax._internal.checks import listing, shorten
+
 
 def check_capsules(capsules: Any, link_names: Sequence[str]) -> dict[str, Any]:
     """Return the fields `capsule_link`, `capsule_start`, `capsule_end` and `capsule_radius` of `Robot`.
@@ -13,21 +16,21 @@ def check_capsules(capsules: Any, link_names: Sequence[str]) -> dict[str, Any]:
         ValueError: naming the capsule, for an unknown link, an end that is no finite point, or a radius not positive.
     """
     links, starts, ends, radii = [], [], [], []
-    for i, capsule in enumerate(capsules):
+    for i, capsule in enumerate(listing("capsules", capsules, "capsules")):
         if not isinstance(capsule, tuple) or len(capsule) != 4:
-            raise ValueError(f"capsules[{i}] is {capsule!r:.100}; it must be a Capsule(link, start, end, radius).")
+            raise ValueError(f"capsules[{i}] is {shorten(capsule)}; it must be a Capsule(link, start, end, radius).")
         link, start, end, radius = capsule
         if isinstance(link, str) and link in link_names:
             link = link_names.index(link)
         if isinstance(link, bool) or not isinstance(link, int | np.integer) or not 0 <= link < len(link_names):
-            raise ValueError(f"capsules[{i}].link is {link!r:.100}; the links are {', '.join(link_names)}.")
+            raise ValueError(f"capsules[{i}].link is {shorten(link)}; the links are {', '.join(link_names)}.")
         for entry, point in (("start", start), ("end", end)):
-            array = np.asarray(point)
-            if array.shape != (3,) or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
-                raise ValueError(f"capsules[{i}].{entry} is {point!r:.100}; it must be three finite numbers, in m.")
-        number = np.asarray(radius)
-        if number.shape or number.dtype.kind not in "iuf" or not 0 < number < np.inf:
-            raise ValueError(f"capsules[{i}].radius is {radius!r:.100}; it must be one positive number, in m.")
+            array = np.asarray(as_numbers(f"capsules[{i}].{entry}", point))
+            if array.shape != (3,) or not np.isfinite(array).all():
+                raise ValueError(f"capsules[{i}].{entry} is {shorten(point)}; it must be three finite numbers, in m.")
+        number = np.asarray(as_numbers(f"capsules[{i}].radius", radius))
+        if number.shape or not 0 < number < np.inf:
+            raise ValueError(f"capsules[{i}].radius is {shorten(radius)}; it must be one positive number, in m.")
         links.append(int(link))
         starts.append(start)
         ends.append(end)
@@ -47,10 +50,10 @@ def check_pairs(pairs: Any, capsule_link: tuple[int, ...]) -> tuple[tuple[int, i
         ValueError: naming the pair, if it is none.
     """
     found = []
-    for i, pair in enumerate(pairs):
+    for i, pair in enumerate(listing("collision_pairs", pairs, "pairs of numbers of capsules")):
         numbers = tuple(pair) if isinstance(pair, tuple | list | np.ndarray) else ()
         if len(numbers) != 2 or not all(isinstance(n, int | np.integer) and not isinstance(n, bool) for n in numbers):
-            raise ValueError(f"collision_pairs[{i}] is {pair!r:.100}; it must be two numbers of capsules.")
+            raise ValueError(f"collision_pairs[{i}] is {shorten(pair)}; it must be two numbers of capsules.")
         first, second = sorted(map(int, numbers))
         if first < 0 or second >= len(capsule_link) or capsule_link[first] == capsule_link[second]:
             raise ValueError(

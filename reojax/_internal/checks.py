@@ -3,13 +3,14 @@
 Public functions call these once; what they call inside trusts its input.
 """
 
-from collections.abc import Iterable, Sequence
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reojax._internal.arrays import as_numbers, is_concrete
+from reojax._internal.arrays import as_numbers, is_concrete, refuse_lookalikes
 
 T = TypeVar("T")
 
@@ -76,11 +77,28 @@ def positive(entry: str, value: Any, unit: str = "rad") -> float:
     return float(array)
 
 
+def listing(entry: str, value: Any, what: str) -> list[Any]:
+    """Return the items of a list, or of anything else that can be gone through, but for a string."""
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable):
+        raise ValueError(f"`{entry}` is {shorten(value)}; it must list {what}.")
+    return list(value)
+
+
 def one_of(entry: str, value: Any, choices: Sequence[str]) -> str:
     """Return a name that is among `choices`."""
     if not isinstance(value, str) or value not in choices:
-        raise ValueError(f"`{entry}` is {shorten(value)}; it must be one of {', '.join(map(repr, choices))}.")
+        known = ", ".join(map(repr, choices))
+        raise ValueError(f"`{entry}` is {shorten(value)}; it must be one of {known}.{did_you_mean(value, choices)}")
     return value
+
+
+def did_you_mean(value: Any, names: Iterable[str]) -> str:
+    """A question that names what was probably meant, led by a space; nothing where nothing is near."""
+    if not isinstance(value, str) or len(value) > _LONGEST:
+        return ""
+    lower = {name.lower(): name for name in names}
+    near = difflib.get_close_matches(value.lower(), lower, 1, 0.6)
+    return f" Did you mean {lower[near[0]]!r}?" if near else ""
 
 
 def index_of(entry: str, value: Any, names: Sequence[str], kind: str) -> int:
@@ -93,7 +111,9 @@ def index_of(entry: str, value: Any, names: Sequence[str], kind: str) -> int:
         or not 0 <= value < len(names)
     ):
         known = f"a number from 0 to {len(names) - 1} or one of {shorten(', '.join(names))[1:-1]}" if names else "none"
-        raise ValueError(f"`{entry}` is {shorten(value)}; it must be a {kind} of the robot: {known}.")
+        raise ValueError(
+            f"`{entry}` is {shorten(value)}; it must be a {kind} of the robot: {known}." + did_you_mean(value, names)
+        )
     return int(value)
 
 
@@ -141,6 +161,7 @@ def rotations(
 def numbers(entry: str, value: Any, shape: tuple[int, ...], *, finite: bool = True) -> np.ndarray:
     """Return `value` as a float64 array of `shape` (-1: any length); no NaN, and no infinity if `finite`."""
     text = str(shape).replace("-1", "n")
+    refuse_lookalikes(entry, value)
     try:
         given = np.asarray(value)
         if given.dtype.kind not in "iuf":  # digits in strings, truth values and complex numbers would convert

@@ -46,6 +46,26 @@ def solve_positive(matrix: Float[Array, "n n"], right: Float[Array, "n ..."]) ->
     return jax.lax.custom_linear_solve(product, right, lambda _, b: cholesky_solve(lower, b), symmetric=True)
 
 
+def solve_without_exchange(matrix: Float[Array, "n n"], right: Float[Array, " n"]) -> Float[Array, " n"]:
+    """Solve `matrix @ x = right` by elimination without exchange of rows (Gauss and Jordan).
+
+    For matrices whose symmetric part is positive definite: there no pivot vanishes, and rounding stays small while the
+    rest of the matrix is smaller than that part.
+    """
+    rows = jnp.arange(matrix.shape[0])
+
+    def eliminate(rest: jax.Array, k: Any) -> tuple[jax.Array, None]:
+        row = rest[k] / rest[k, k]
+        return jnp.where((rows == k)[:, None], row[None], rest - rest[:, k][:, None] * row[None]), None
+
+    both = jnp.concatenate([matrix, right[:, None]], axis=1)
+    if len(rows) > UNROLLED:
+        return jax.lax.scan(eliminate, both, rows)[0][:, -1]
+    for k in range(len(rows)):
+        both = eliminate(both, k)[0]
+    return both[:, -1]
+
+
 def cholesky(matrix: Float[Array, "n n"], *, drop: bool = False) -> Float[Array, "n n"]:
     """Lower triangular `L` of `L @ L.T = matrix`, symmetric positive definite; for `cholesky_solve`.
 

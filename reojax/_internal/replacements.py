@@ -6,7 +6,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from reojax._internal.checks import refuse, shorten
+from reojax._internal.arrays import refuse_lookalikes
+from reojax._internal.checks import listing, refuse, shorten
 
 _FREE = ("collision_pairs", "couplings", "layout", "notes")
 """Static fields that may change in length."""
@@ -25,10 +26,11 @@ def replacement(robot: Any, key: str, value: Any) -> Any:
             raise ValueError(f"`{key}` is {shorten(value)}; it must be a string.")
         return value
     if key in _FREE:
-        return value
+        return value if key == "layout" else tuple(listing(key, value, "its entries"))
     if isinstance(old, tuple):
         return _names_or_numbers(robot, key, value, old)
     given = value
+    refuse_lookalikes(key, value)
     if not hasattr(value, "shape"):
         try:
             value = jnp.asarray(value) if _on_device(value) else np.asarray(value)

@@ -1,14 +1,14 @@
 """The door of `make_robot`: plain numbers in, checked NumPy arrays out, or a `ValueError`."""
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from reojax._internal.arrays import is_concrete
 from reojax._internal.capsule_checks import check_capsules, check_pairs, default_pairs
-from reojax._internal.checks import index_of, numbers, refuse, shorten
+from reojax._internal.checks import index_of, listing, numbers, refuse, shorten
 from reojax._internal.definiteness import check_energy
 from reojax._internal.inertias import NOISE, breaks_triangle
 
@@ -77,9 +77,11 @@ def _couplings(value: Any, names: tuple[str, ...]) -> dict[str, Any]:
     """Coupled joints as the fields `couplings`, `coupling_ratio` and `coupling_offset` of `Robot`."""
 
     pairs, numbers_ = [], []
-    for key, rule in dict(value or {}).items():
+    if value is not None and not isinstance(value, Mapping):
+        raise ValueError(f"`couplings` is {shorten(value)}; it must map joints to (driver, ratio, offset).")
+    for key, rule in (value or {}).items():
         if not isinstance(rule, tuple | list) or len(rule) != 3:
-            raise ValueError(f"couplings[{key!r:.60}] is {shorten(rule)}; it must be (driver, ratio, offset).")
+            raise ValueError(f"couplings[{shorten(key)}] is {shorten(rule)}; it must be (driver, ratio, offset).")
         follower = index_of("a key of couplings", key, names, "joint")
         pairs.append((follower, index_of(f"couplings[{names[follower]!r}][0]", rule[0], names, "joint")))
         numbers_.append(numbers(f"couplings[{names[follower]!r}][1:]", rule[1:], (2,)))
@@ -158,7 +160,7 @@ def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str,
     }
     fields |= _couplings(entries["couplings"], fields["joint_names"])
     fields |= check_capsules(entries["capsules"], fields["link_names"])
-    fields["notes"] = (*map(str, entries["notes"]), *check_energy(fields))
+    fields["notes"] = (*map(str, listing("notes", entries["notes"], "strings")), *check_energy(fields))
     if entries["collision_pairs"] is None:
         fields["collision_pairs"], touching = default_pairs(fields)
         fields["notes"] += _touching(touching, [fields["link_names"][i] for i in fields["capsule_link"]])

@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from reojax._internal.arrays import as_numbers
 from reojax._internal.checks import instance, number
+from reojax._internal.precision import in_double
 from reojax.captures.alignment import Simulated, align, align_frames, interpolate
 from reojax.captures.capture import Capture
 from reojax.captures.mistakes import LARGE, suspects
@@ -73,6 +74,7 @@ class Comparison(NamedTuple):
         return float(max(there, default=np.nan))
 
 
+@in_double
 def joints_simulated(robot: Robot, capture: Capture) -> Sampled:
     """Motion that follows from the measured joint angles: the base's orientation by `A omega = B theta_dot`.
 
@@ -89,6 +91,7 @@ def joints_simulated(robot: Robot, capture: Capture) -> Sampled:
     return Sampled(capture.time, theta, orientations(robot, theta))
 
 
+@in_double
 def compare(
     robot: Robot, capture: Capture, motion: Simulated | None = None, *, offset: float | None = None
 ) -> Comparison:

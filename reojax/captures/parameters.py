@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from reojax._internal.arrays import Array
-from reojax._internal.checks import shorten
+from reojax._internal.checks import did_you_mean, shorten
 from reojax.robot import Robot
 from reojax.robots.edits import with_end_inertia
 
@@ -57,7 +57,7 @@ def parameter(robot: Robot, name: str) -> Parameter:
         fields = ", ".join(UNITS)
         raise ValueError(
             f"there is no parameter {name!r}; there are end_inertia, rotor_inertia, gear_ratio, and entries such as "
-            f"mass[1] or com[0,2] of the fields {fields}."
+            f"mass[1] or com[0,2] of the fields {fields}." + did_you_mean(text, ("end_inertia", *UNITS))
         )
     return _entry(robot, text, match[1], tuple(int(index) for index in match[2].split(",")))
 

@@ -4,8 +4,7 @@ import argparse
 import json
 from typing import TYPE_CHECKING, Any
 
-from reojax._internal.version import version
-from reojax.cli._arguments import BadInput
+from reojax.cli._arguments import BadInput, version
 
 if TYPE_CHECKING:
     from reojax.planning.plan_file import SavedPlan

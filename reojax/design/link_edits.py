@@ -23,7 +23,7 @@ def with_mass(robot: Robot, link: int | str, mass: ArrayLike) -> Robot:
     Raises:
         ValueError: if there is no such link, or `mass` is not one positive number.
     """
-    index, wanted = checks.index_of("link", link, robot.link_names, "link"), _positive("mass", mass)
+    index, wanted = _number(robot, "link", link), _positive("mass", mass)
     share = wanted / robot.mass[index]
     return robot.replace(
         mass=_set_link(robot.mass, index, wanted), inertia=_set_link(robot.inertia, index, share * robot.inertia[index])
@@ -36,7 +36,7 @@ def with_com_offset(robot: Robot, link: int | str, offset: ArrayLike) -> Robot:
     Raises:
         ValueError: if there is no such link, or `offset` is not of shape (3,).
     """
-    index, move = checks.index_of("link", link, robot.link_names, "link"), as_numbers("offset", offset)
+    index, move = _number(robot, "link", link), as_numbers("offset", offset)
     if move.shape != (3,):
         raise ValueError(f"`offset` has shape {move.shape}; it must be (3,), in m.")
     return robot.replace(com=_set_link(robot.com, index, robot.com[index] + move))
@@ -54,12 +54,12 @@ def with_length(robot: Robot, link: int | str, factor: ArrayLike, *, along: Arra
     Raises:
         ValueError: if there is no such link, `factor` is not one positive number, or `along` is no direction.
     """
-    index, scale = checks.index_of("link", link, robot.link_names, "link"), _positive("factor", factor)
+    index, scale = _number(robot, "link", link), _positive("factor", factor)
     share = np.eye(3)
     if along is not None:
         direction = np.asarray(as_numbers("along", along), float)
         if direction.shape != (3,) or not direction.any() or not np.isfinite(direction).all():
-            raise ValueError(f"`along` is {along!r}; it must be (3,), finite and not zero.")
+            raise ValueError(f"`along` is {checks.shorten(along)}; it must be (3,), finite and not zero.")
         share = np.outer(direction, direction) / (direction @ direction)
     stretch = jnp.eye(3, dtype=jnp.result_type(scale)) + (scale - 1) * share
     robot = _stretch(robot, index, stretch, jnp.zeros(3, stretch.dtype))
@@ -75,7 +75,7 @@ def with_joint_inertia(robot: Robot, joint: int | str, inertia: ArrayLike) -> Ro
     Raises:
         ValueError: if there is no such joint, or `inertia` is not one positive number.
     """
-    number = checks.index_of("joint", joint, robot.joint_names, "joint")
+    number = _number(robot, "joint", joint)
     wanted, link = _positive("inertia", inertia), number + 1
     axis, com = robot.axis[number], robot.com[link]
     along = axis[:, None] * axis[None, :]
@@ -100,8 +100,14 @@ def _set_link(array: Any, index: int, value: Any) -> jax.Array:
     return jnp.asarray(array).at[index].set(value)
 
 
+def _number(robot: Robot, kind: str, value: int | str) -> int:
+    """Number of a link or joint of what has to be a robot."""
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
+    return checks.index_of(kind, value, robot.link_names if kind == "link" else robot.joint_names, kind)
+
+
 def _positive(entry: str, value: ArrayLike) -> Any:
     number = as_numbers(entry, value)
     if number.shape or (is_concrete(number) and not 0 < number < np.inf):
-        raise ValueError(f"`{entry}` is {value!r}; it must be one positive, finite number.")
+        raise ValueError(f"`{entry}` is {checks.shorten(value)}; it must be one positive, finite number.")
     return number

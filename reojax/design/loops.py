@@ -16,7 +16,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
-from reojax._internal.arrays import Array
+from reojax._internal.arrays import Array, as_numbers
 from reojax._internal.checks import numbers
 from reojax.design.variables import Variable
 from reojax.manoeuvres import Layout, check_layout, rectangle_corners
@@ -60,7 +60,7 @@ def rectangles(
     Raises:
         ValueError: for a start outside of the joint limits, a joint without limits, or no layout.
     """
-    layout = layout_of(robot) if layout is None else layout
+    layout = layout_of(checks.instance("robot", robot, Robot, "`make_robot` makes")) if layout is None else layout
     check_layout(layout)
     if layout.joints != robot.joints:
         raise ValueError(f"`layout` is for {layout.joints} joints; {robot.name!r} has {robot.joints} joints.")
@@ -85,7 +85,8 @@ def polygons(robot: Robot, corners: int, *, start: ArrayLike = 0.0, name: str = 
     Raises:
         ValueError: for too few corners, a start outside of the joint limits, or a joint without limits.
     """
-    checks.whole("corners", corners, 2)
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
+    checks.whole("corners", corners, 2, 10**4)
     moves = (corners + 1) * robot.joints
     edges = np.eye(moves).reshape(corners + 1, robot.joints, moves)
     return _of_moves(f"polygon of {corners} corners", robot, edges, start, name)
@@ -93,9 +94,8 @@ def polygons(robot: Robot, corners: int, *, start: ArrayLike = 0.0, name: str = 
 
 def _of_moves(kind: str, robot: Robot, edges: np.ndarray, start: ArrayLike, name: str) -> Loops:
     """Loops whose edges are `edges` (e, j, k) times k moves, each with a part up and a part down."""
-    low, high, origin = limits_of(robot, start)
+    low, high, origin = limits_of(robot, start, name)
     count = edges.shape[2]
-    # travel of a unit of each part; its largest useful size; corners as running sums of the edges
     price = np.tile(np.abs(edges).sum((0, 1)), 2)
     reach = np.einsum("ejk,j->k", np.abs(edges) > 0, high - low) / (np.abs(edges) > 0).sum((0, 1))
     corner = np.cumsum(edges, axis=0)
@@ -137,12 +137,19 @@ def _of_moves(kind: str, robot: Robot, edges: np.ndarray, start: ArrayLike, name
     return Loops(kind, variable, path, travel, equality, inequality, random)
 
 
-def limits_of(robot: Robot, start: ArrayLike) -> tuple[Float[np.ndarray, " j"], ...]:
+def limits_of(robot: Robot, start: ArrayLike, name: str = "loop") -> tuple[Float[np.ndarray, " j"], ...]:
     """Lower and upper limits, and the start as (j,), checked."""
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
+    if np.shape(robot.lower) != (robot.joints,):
+        raise ValueError(f"`robot.lower` has shape {np.shape(robot.lower)}; of one robot it is ({robot.joints},).")
+    if not isinstance(name, str):
+        raise ValueError(f"`name` is {checks.shorten(name)}; it must be a string.")
+    checks.on_host("robot", robot, "what makes loops")
     low, high = np.asarray(robot.lower, float), np.asarray(robot.upper, float)
     for k in np.flatnonzero(~(np.isfinite(low) & np.isfinite(high))):
         raise ValueError(f"joint {robot.joint_names[k]!r} has no limits; loops need finite `lower` and `upper`.")
-    given: Any = np.broadcast_to(start, (robot.joints,)) if np.ndim(start) == 0 else start
+    point = np.asarray(as_numbers("start", start))
+    given: Any = np.broadcast_to(point, (robot.joints,)) if point.ndim == 0 else point
     origin = numbers("start", given, (robot.joints,))
     for k in np.flatnonzero((origin < low) | (origin > high)):
         raise ValueError(f"start[{k}] is {origin[k]:g} rad; that joint moves from {low[k]:g} to {high[k]:g}.")

@@ -30,7 +30,7 @@ def turned_to(target: ArrayLike | str) -> Measure:
     """
     if isinstance(target, str):
         name = target
-        return lambda outcome: so3.log(so3.exp(outcome.values[name]).T @ outcome.rotation)
+        return lambda outcome: so3.log(so3.exp(_value(outcome, name)).T @ outcome.rotation)
     matrix = checks.rotations("target", target)
 
     def measure(outcome: Outcome) -> Array:
@@ -130,7 +130,7 @@ def bend_within(joint: int | str, name: str) -> Measure:
 
     def measure(outcome: Outcome) -> Array:
         number = checks.index_of("joint", joint, outcome.robot.joint_names, "joint")
-        angle, most = jnp.asarray(outcome.path.waypoints)[:, number], outcome.values[name]
+        angle, most = jnp.asarray(outcome.path.waypoints)[:, number], _value(outcome, name)
         return jnp.concatenate([angle - most, -angle - most])
 
     return measure
@@ -138,16 +138,30 @@ def bend_within(joint: int | str, name: str) -> Measure:
 
 def value_of(name: str) -> Measure:
     """The variable `name` itself, in SI."""
-    return lambda outcome: outcome.values[name]
+    return lambda outcome: _value(outcome, name)
 
 
 def weighted(parts: Mapping[Measure, float]) -> Measure:
-    """Sum of measures, each times its weight."""
+    """Sum of measures, each times its weight.
+
+    Raises:
+        ValueError: if `parts` is no mapping of functions to finite numbers.
+    """
+    if not isinstance(parts, Mapping) or not all(map(callable, parts)):
+        raise ValueError(f"`parts` is {checks.shorten(parts)}; it must map measures, which are functions, to weights.")
+    parts = {part: checks.number("a weight of `parts`", weight) for part, weight in parts.items()}
 
     def measure(outcome: Outcome) -> Array:
         return sum((weight * part(outcome) for part, weight in parts.items()), start=jnp.zeros(()))
 
     return measure
+
+
+def _value(outcome: Outcome, name: str) -> Array:
+    if name not in outcome.values:
+        known = ", ".join(outcome.values)
+        raise ValueError(f"there is no variable {checks.shorten(name)}; the variables are {known}.")
+    return outcome.values[name]
 
 
 def _unit(axis: ArrayLike) -> np.ndarray:

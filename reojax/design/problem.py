@@ -22,7 +22,6 @@ from reojax.design.variables import Space, Variable
 from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation
 from reojax.optimisation.functions import Functions
 from reojax.optimisation.optimise import Solution, optimise
-from reojax.optimisation.status import describe
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -66,21 +65,6 @@ class Solutions(NamedTuple):
     best: Int[np.ndarray, " k"]
     """Which start is best for each problem: of least cost among the converged, else of least residual."""
 
-    @property
-    def violation(self) -> Float[np.ndarray, "k s"]:
-        """Another name for `residual`, the one that all solvers' results have."""
-        return self.residual
-
-    @property
-    def error(self) -> Float[np.ndarray, "k s"]:
-        """Another name for `residual`."""
-        return self.residual
-
-    @property
-    def message(self) -> list[list[str]]:
-        """Why each start of each problem ended, in words."""
-        return [list(describe(row)) for row in self.status]
-
     def pick(self) -> Solution:
         """The best answer of each problem, the problems in front."""
         rows = np.arange(len(self.best)), self.best
@@ -95,7 +79,7 @@ class _Limits(NamedTuple):
     tolerance: float
     slope_tolerance: float
     max_steps: int
-    progress: bool | str
+    progress: str | None
 
 
 class Problem:
@@ -128,6 +112,18 @@ class Problem:
         Raises:
             ValueError: for bad variables, see `Space`.
         """
+        for entry, function in (("build", build), ("objective", objective)):
+            if not callable(function):
+                raise ValueError(f"`{entry}` is {checks.shorten(function)}; it must be a function.")
+        for entry, listed, kind in (
+            ("variables", variables, Variable | Loops),
+            ("equality", equality, Callable),
+            ("inequality", inequality, Callable),
+        ):
+            if not isinstance(listed, Sequence) or not all(isinstance(item, kind) for item in listed):
+                what = "measures, which are functions" if kind is Callable else "Variables and families of loops"
+                raise ValueError(f"`{entry}` is {checks.shorten(listed)}; it must list {what}.")
+        checks.whole("steps", steps)
         self.loops = tuple(v for v in variables if isinstance(v, Loops))
         self.space = Space([v.variable if isinstance(v, Loops) else v for v in variables])
         self._build, self._steps = build, steps
@@ -196,7 +192,7 @@ class Problem:
         tolerance: float = 1e-8,
         slope_tolerance: float = 1e-6,
         max_steps: int = 200,
-        progress: bool | str = False,
+        progress: str | None = None,
     ) -> Solution:
         """Solve from many starts by `optimise`.
 
@@ -210,7 +206,7 @@ class Problem:
             tolerance: of `optimise`, and so are `slope_tolerance`, `max_steps` and `progress`.
             slope_tolerance: largest slope.
             max_steps: most steps of a start.
-            progress: whether to show a bar on stderr, or what to write before it.
+            progress: what to write before a bar on stderr.
 
         Raises:
             ValueError: for an unknown name or a value outside of its bounds; and as `optimise`.
@@ -240,7 +236,7 @@ class Problem:
         tolerance: float = 1e-8,
         slope_tolerance: float = 1e-6,
         max_steps: int = 200,
-        progress: bool | str = False,
+        progress: str | None = None,
     ) -> Solutions:
         """Solve many problems that differ by the values of some variables, side by side, each from every start.
 
@@ -258,7 +254,7 @@ class Problem:
             tolerance: of `optimise`, and so are `slope_tolerance`, `max_steps` and `progress`.
             slope_tolerance: largest slope.
             max_steps: most steps of a start.
-            progress: whether to show a bar on stderr, or what to write before it.
+            progress: what to write before a bar on stderr.
 
         Raises:
             ValueError: for no values, different numbers of them, an unknown name or a value outside of its bounds; and

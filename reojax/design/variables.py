@@ -10,6 +10,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array, as_numbers
+from reojax._internal.checks import shorten
 
 SI = {
     "": 1.0,
@@ -50,6 +51,9 @@ class Space:
             ValueError: for names that repeat, an unknown unit, bounds the wrong way round, or a catalogue outside.
         """
         self.variables = tuple(variables)
+        for k, variable in enumerate(self.variables):
+            if not isinstance(variable, Variable) or not isinstance(variable.name, str) or not variable.name:
+                raise ValueError(f"variables[{k}] is {shorten(variable)}; it must be a Variable with a name.")
         self.names = tuple(variable.name for variable in self.variables)
         if not self.variables or len(set(self.names)) != len(self.names):
             raise ValueError(f"`variables` are named {self.names}; there must be at least one, and names must differ.")
@@ -104,7 +108,7 @@ class Space:
 
 def _bounds(variable: Variable) -> tuple[np.ndarray, np.ndarray]:
     name = variable.name
-    if variable.unit not in SI:
+    if not isinstance(variable.unit, str) or variable.unit not in SI:
         raise ValueError(f"variable {name!r} has unit {variable.unit!r}; the units are {', '.join(map(repr, SI))}.")
     low, high = (np.asarray(as_numbers(f"{name}.{end}", getattr(variable, end))) for end in ("lower", "upper"))
     if low.shape != high.shape:

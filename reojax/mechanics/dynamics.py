@@ -162,6 +162,18 @@ def joint_inertia_of_pose(robot: Robot, pose: Kinematics) -> Float[Array, "j j"]
     return _fixed_base_inertia(robot, pose) - B.T @ solve_symmetric3(A, B)
 
 
+def rotor_inertia_of_pose(robot: Robot, pose: Kinematics) -> Float[Array, "j j"]:
+    """How joint accelerations spin the rotors up: `Load.rotor` is this times `theta_ddot`, and its rest at 0.
+
+    Row k is `J s e . w'` of the stator's link, whose angular acceleration `w'` has the base's in it, and `J s^2`.
+    """
+    A, B = momentum_matrices_of_pose(robot, pose)
+    spin = rotor_spin(robot)
+    turned = pose.angular_jacobian[_stator(robot)] + solve_symmetric3(A, B)[None]
+    carried = jnp.einsum("k,ka,kal->kl", robot.rotor_inertia * spin, pose.axis, turned)
+    return carried + jnp.diag(robot.rotor_inertia * spin * spin)
+
+
 def base_velocity(
     robot: Robot,
     theta: Float[Array, " j"],

@@ -57,6 +57,7 @@ def write_mjcf(
         ValueError: naming the entry; or the joint whose rotor has more inertia than its link.
     """
     checks.instance("robot", robot, Robot, "`make_robot` makes")
+    checks.whole("samples", samples, 1, 10**6)
     checks.on_host("robot", robot, "write_mjcf")
     target = check_ending(path, "model for MuJoCo", ("xml", "mjcf"))
     checks.whole("samples", samples)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
+from reojax._internal.precision import in_double
 from reojax.collision.refusal import check_clearance
 from reojax.mechanics.holonomy import net_rotation
 from reojax.motion._optimal_control import Apart, Fastest as Fastest, Task, UnknownBox, least_duration
@@ -28,11 +29,11 @@ def overlap(
     robot: Robot,
     path: Path,
     motors: Motor | Sequence[Motor],
-    law: Law | str = "quintic",
+    law: Law | str | None = None,
     *,
     clearance: float | None = None,
     max_steps: int = 100,
-    progress: bool | str = False,
+    progress: str | None = None,
 ) -> Fastest:
     """Run a path with its edges overlapped: each joint's move in each edge gets a time of its own.
 
@@ -43,16 +44,16 @@ def overlap(
         robot: the robot; its rotor inertias and gear ratios hold, and its limits.
         path: the path in shape space, with numbers that can be read: not under `jit`.
         motors: motors of the joints, one for all or one for each.
-        law: the time law of every move, or its name.
+        law: the time law of every move, or its name; default `quintic()`.
         clearance: least distance between the robot's parts, from 0 up, that is proven to be kept at all times [m];
             default not asked. Both ends of the path must have it.
         max_steps: most steps of the optimiser.
-        progress: whether to show a bar on stderr, or what to write before it.
+        progress: what to write before a bar on stderr; default no bar.
 
     Raises:
         ValueError: as `minimum_time`, for a path that stays where it is, and for ends that do not have the clearance.
     """
-    law = check_law(law)
+    law = quintic() if law is None else check_law(law)
     checks.whole("max_steps", max_steps)
     _check_moves(path)
     least = minimum_time(robot, path, motors, law)
@@ -95,7 +96,7 @@ def free_law(
     points: int = 5,
     clearance: float | None = None,
     max_steps: int = 100,
-    progress: bool | str = False,
+    progress: str | None = None,
 ) -> Fastest:
     """Run a path, corners and all, by the fastest time law of each edge: a spline through `points` free points.
 
@@ -109,7 +110,7 @@ def free_law(
         clearance: least distance between the robot's parts, from 0 up, that is proven to be kept at all times [m];
             default not asked. The path must have it.
         max_steps: most steps of the optimiser.
-        progress: whether to show a bar on stderr, or what to write before it.
+        progress: what to write before a bar on stderr; default no bar.
 
     Raises:
         ValueError: as `overlap`, and for `points` that is no positive integer.
@@ -146,6 +147,7 @@ def free_law(
     return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
 
+@in_double
 def fastest_loop(
     robot: Robot,
     target: ArrayLike,
@@ -157,7 +159,7 @@ def fastest_loop(
     seed: int = 0,
     clearance: float | None = None,
     max_steps: int = 200,
-    progress: bool | str = False,
+    progress: str | None = None,
 ) -> Fastest:
     """The fastest closed motion with a given net rotation: a spline of free knots at free times, at rest at both ends.
 
@@ -172,7 +174,7 @@ def fastest_loop(
         clearance: least distance between the robot's parts, from 0 up, that is proven to be kept at all times [m];
             default not asked. The posture where `near` begins must have it.
         max_steps: most steps of the optimiser.
-        progress: whether to show a bar on stderr, or what to write before it.
+        progress: what to write before a bar on stderr; default no bar.
 
     Raises:
         ValueError: as `minimum_time`, for a target that is no rotation, fewer than 3 `knots`, no `starts`, or a path

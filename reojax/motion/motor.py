@@ -140,7 +140,10 @@ def demand(
     """Voltage that a load takes, by how it grows with the speed of the motion at zero momentum [V].
 
     Args:
-        robot, motors, theta_dot, load: as for `drive`.
+        robot: as for `drive`.
+        motors: as for `drive`.
+        theta_dot: as for `drive`.
+        load: as for `drive`.
         soft: power over which driving turns into being driven back [W], so that an optimiser finds the demand
             smooth; static. It jumps at 0, the default.
 

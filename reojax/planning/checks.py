@@ -6,8 +6,9 @@ from typing import Any
 import jax
 import numpy as np
 
-from reojax._internal.checks import instance, on_host
+from reojax._internal.checks import on_host
 from reojax.manoeuvres import Layout, check_layout
+from reojax.mechanics.input_checks import check_robot
 from reojax.robot import Robot, layout_of
 
 OBJECTIVES = ("count", "travel")
@@ -23,7 +24,7 @@ def key_of(robot: Robot) -> Hashable:
 
 def a_robot(robot: Any) -> None:
     """Refuse what is no robot of concrete numbers."""
-    instance("robot", robot, Robot, "`make_robot` makes")
+    check_robot(robot)
     on_host("robot", robot, "planning")
 
 

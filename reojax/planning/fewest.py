@@ -23,6 +23,7 @@ from reojax.planning.candidates import (
 )
 from reojax.planning.initial_guesses import FIRST, Starts
 from reojax.planning.repeated_loops import group_rows, loops
+from reojax.planning.variations import vary
 
 LONGEST = 6
 """Longest word whose loops each have amplitudes of their own; longer words repeat loops."""
@@ -60,7 +61,7 @@ class Answer:
         slots = SIZES[-1]
         square = 4 * (targets[1:] ** 2).sum(0)
         empty = np.full((slots, m), -1), np.ones((slots, m)), np.zeros((d, slots, m)), square
-        self.rows = Candidates(np.arange(m), *empty)  # arrays of its own, which `update_best` writes into
+        self.rows = Candidates(np.arange(m), *empty)
         self.travel = np.zeros(m)
         self.tolerance = tolerance
         self._box = scene.box
@@ -97,6 +98,7 @@ def fewest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -> 
         _with_small_loops(scene, targets, most, answer, loops)
     last = (_LONGEST_ROUND,) if longest == LONGEST else ()
     _with_loops(scene, targets, answer, longest, (*_ROUNDS, _LAST_ROUND, *last), whatever=True)
+    _with_variations(scene, targets, answer, longest, most)
     return answer
 
 
@@ -127,6 +129,17 @@ def _with_loops(
         missed = found.take(found.square >= close)
         answer.update_best(least(missed, missed.square))
         _update_from_solutions(scene, targets, answer, found.take(found.square < close), keep=1)
+
+
+def _with_variations(scene: Context, targets: np.ndarray, answer: Answer, slots: int, most: int) -> None:
+    """Try variations of the best words for what nothing else reached."""
+    waiting = np.flatnonzero(~answer.solved)
+    if not len(waiting):
+        return
+    found = vary(scene, targets, answer.rows.take(waiting), slots, most)
+    missed = found.take(found.square >= _CLOSE)
+    answer.update_best(least(missed, missed.square))
+    _update_from_solutions(scene, targets, answer, found.take(found.square < _CLOSE), keep=4)
 
 
 def _continue_search(scene: Context, targets: np.ndarray, found: Candidates) -> Candidates:

@@ -49,7 +49,8 @@ def true_rotations(robot: Robot, layout: Layout, amplitudes: Float[np.ndarray, "
     pattern = pattern_of(robot)
 
     def rotations(chunk: np.ndarray) -> np.ndarray:
-        return np.asarray(_net_rotations(without_names(robot), chunk, steps, pattern))
+        with jax.enable_x64(True):  # a thread of its own starts with JAX's default
+            return np.asarray(_net_rotations(without_names(robot), chunk, steps, pattern))
 
     with ThreadPoolExecutor(usable_cores()) as pool:
         turned = list(pool.map(rotations, corners.reshape(-1, _CHUNK, *corners.shape[1:])))

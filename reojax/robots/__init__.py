@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from reojax._internal.checks import shorten
+from reojax._internal.checks import did_you_mean, shorten
 from reojax.robot import Robot
 from reojax.robots.astronaut import astronaut as astronaut
 from reojax.robots.edits import (
@@ -42,6 +42,7 @@ def by_name(name: str) -> Robot:
     Raises:
         ValueError: if `name` is not one of `NAMES`.
     """
-    if name not in _BUILDERS:
-        raise ValueError(f"there is no robot named {shorten(name)}; the names are {', '.join(NAMES)}.")
+    if not isinstance(name, str) or name not in _BUILDERS:
+        known = ", ".join(NAMES)
+        raise ValueError(f"there is no robot named {shorten(name)}; the names are {known}.{did_you_mean(name, NAMES)}")
     return _BUILDERS[name]()

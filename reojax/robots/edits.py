@@ -8,9 +8,9 @@ import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
-from reojax._internal.arrays import is_concrete, kind_of_arrays
+from reojax._internal.arrays import as_numbers, is_concrete, kind_of_arrays
 from reojax._internal.capsule_checks import check_capsules, check_pairs, default_pairs
-from reojax._internal.checks import index_of, refuse
+from reojax._internal.checks import index_of, instance, refuse, shorten
 from reojax.capsules import Capsule
 from reojax.robot import Robot
 
@@ -30,12 +30,14 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
     Raises:
         ValueError: if the robot has not four links, or `inertia` is not one positive, finite number.
     """
+    instance("robot", robot, Robot, "`make_robot` makes")
     if robot.links != 4:
         raise ValueError(f"{robot.name!r} has {robot.links} links; end links are defined for the four-link robot.")
+    as_numbers("inertia", inertia)
     xp, cast = kind_of_arrays(robot, inertia)
     wanted = cast(inertia)
     if wanted.shape or (is_concrete(wanted) and not 0 < wanted < np.inf):
-        raise ValueError(f"`inertia` is {wanted}; it must be one positive, finite number, in kg m^2.")
+        raise ValueError(f"`inertia` is {_told(wanted)}; it must be one positive, finite number, in kg m^2.")
     mass, com, moment, axes, anchor = map(
         kind_of_arrays(robot)[1], (robot.mass, robot.com, robot.inertia, robot.axis, robot.anchor)
     )
@@ -120,6 +122,7 @@ def with_limits(
     Raises:
         ValueError: naming the joint whose limits leave no room; or another shape, or a name that no joint has.
     """
+    instance("robot", robot, Robot, "`make_robot` makes")
     low, high = (
         present if given is None else _per_joint(robot, entry, given, present, finite=False)
         for entry, given, present in (("lower", lower, robot.lower), ("upper", upper, robot.upper))
@@ -142,6 +145,7 @@ def with_capsules(robot: Robot, capsules: Sequence[Capsule], collision_pairs: An
     Raises:
         ValueError: naming the capsule or pair, and the rule it breaks.
     """
+    instance("robot", robot, Robot, "`make_robot` makes")
     shapes = check_capsules(capsules, robot.link_names)
     if collision_pairs is None:
         placed = {"parent": robot.parent, "anchor": np.asarray(robot.anchor), **shapes}
@@ -154,6 +158,9 @@ def with_capsules(robot: Robot, capsules: Sequence[Capsule], collision_pairs: An
 def _per_joint(
     robot: Robot, entry: str, value: Any, present: Any, *, least: float = -np.inf, finite: bool = True
 ) -> Any:
+    instance("robot", robot, Robot, "`make_robot` makes")
+    for number in value.values() if isinstance(value, Mapping) else (value,):
+        as_numbers(entry, number)
     if isinstance(value, Mapping):
         xp, cast = kind_of_arrays(robot, *value.values())
         chosen = {index_of(f"a key of {entry}", key, robot.joint_names, "joint"): v for key, v in value.items()}
@@ -164,5 +171,9 @@ def _per_joint(
         raise ValueError(f"`{entry}` has shape {array.shape}; it must be one number or ({robot.joints},).")
     if is_concrete(array) and not ((np.isfinite(array) | (not finite)) & (array >= least)).all():
         rule = "finite" if least == -np.inf else "finite and not negative"
-        raise ValueError(f"`{entry}` is {array}; it must be {rule}.")
+        raise ValueError(f"`{entry}` is {_told(array)}; it must be {rule}.")
     return xp.broadcast_to(array, (robot.joints,))
+
+
+def _told(array: Any) -> str:
+    return shorten(array.tolist() if is_concrete(array) else array)

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
+from reojax._internal.arrays import as_numbers
 from reojax.capsules import Capsule
 from reojax.robot import Robot, make_robot
 
@@ -26,7 +27,7 @@ def planar(n: int, *, mass: ArrayLike = 1.0, length: ArrayLike = 1.0) -> Robot:
     Raises:
         ValueError: if `n` is not an integer from 2 up, or a mass or length is not positive.
     """
-    checks.whole("n", n, 2)
+    checks.whole("n", n, 2, 10**4)
     masses, lengths = _per_rod("mass", mass, n), _per_rod("length", length, n)
     along_x = lengths[:, None] * np.array([1.0, 0.0, 0.0])
     across = masses * lengths**2 / 12
@@ -45,9 +46,9 @@ def planar(n: int, *, mass: ArrayLike = 1.0, length: ArrayLike = 1.0) -> Robot:
 
 
 def _per_rod(entry: str, value: ArrayLike, n: int) -> np.ndarray:
-    array = np.asarray(value, float)
+    array = np.asarray(as_numbers(entry, value), float)
     if array.shape not in ((), (n,)):
         raise ValueError(f"`{entry}` has shape {array.shape}; it must be one number or ({n},).")
     if not (np.isfinite(array) & (array > 0)).all():
-        raise ValueError(f"`{entry}` is {array.tolist()}; it must be positive and finite.")
+        raise ValueError(f"`{entry}` is {checks.shorten(array.tolist())}; it must be positive and finite.")
     return np.broadcast_to(array, (n,))

@@ -11,9 +11,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
 from reojax._internal.linalg import solve_symmetric3
 from reojax.mechanics.dynamics import base_velocity
+from reojax.mechanics.input_checks import MOST_STEPS, check_robot
 from reojax.mechanics.momentum import connection
 from reojax.mechanics.own_units import without_names
 from reojax.mechanics.variation import turn_per_change
@@ -140,8 +142,7 @@ def correction_gains(
 
 
 def _check(robot: Robot, motion: Path | Trajectory | Motion, samples: int, window: float, left: float) -> None:
-    if not isinstance(robot, Robot):
-        raise ValueError(f"`robot` is a {type(robot).__name__}; it must be a Robot, such as `make_robot` makes.")
+    check_robot(robot)
     if not isinstance(motion, Path | Trajectory | Motion):
         raise ValueError(f"`motion` is a {type(motion).__name__}; it must be a Path, a Trajectory or a Motion.")
     joints = motion.theta.shape[1] if isinstance(motion, Motion) else motion.joints
@@ -149,12 +150,9 @@ def _check(robot: Robot, motion: Path | Trajectory | Motion, samples: int, windo
         raise ValueError(f"`motion` moves {joints} joints; {robot.name!r} has {robot.joints}.")
     if isinstance(motion, Path) and not motion.edges:
         raise ValueError("`motion` is a path of one waypoint; nothing can be corrected where nothing moves.")
-    if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 2:
-        raise ValueError(f"`samples` is {samples!r}; it must be an integer, at least 2.")
-    if not (isinstance(window, int | float) and 0 <= window <= 0.5):
-        raise ValueError(f"`window` is {window!r}; it must be a share from 0 to 0.5.")
-    if not (isinstance(left, int | float) and np.isfinite(left) and left > 0):
-        raise ValueError(f"`left` is {left!r}; it must be positive.")
+    checks.whole("samples", samples, 2, MOST_STEPS)
+    checks.number("window", window, least=0.0, most=0.5)
+    checks.positive("left", left, unit="")
 
 
 @partial(jax.jit, static_argnums=5)

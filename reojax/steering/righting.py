@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
+from reojax._internal.precision import in_double
 from reojax.mechanics.dynamics import joint_inertia
 from reojax.mechanics.own_units import without_names
 from reojax.motion.motor import Motor, check_motors, per_joint
@@ -30,6 +31,7 @@ PIECES, FEW_PIECES, MANY_JOINTS = 7, 4, 6
 """Pieces of the spline, and of that of a robot of so many joints or more, which has more ways to turn."""
 
 
+@in_double
 def righting(
     robot: Robot,
     target: ArrayLike,
@@ -79,6 +81,7 @@ def righting(
     return Righting(*(field[0] for field in many))
 
 
+@in_double
 def righting_many(
     robot: Robot,
     targets: ArrayLike,

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from reojax import so3
+from reojax._internal import checks
+from reojax._internal.files import check_ending, replacing
 from reojax.steering.gains import CorrectionGains
 
 _FIELDS = ("at", "theta", "theta_dot", "quaternion", "omega", "connection", "direction", "gramian", "rest")
@@ -51,16 +53,14 @@ def write_gains(gains: CorrectionGains, path: str | Path, *, name: str = "reojax
     Raises:
         ValueError: for another kind of file or a name that C does not have, or if it cannot be written.
     """
-    path, table = Path(path), gain_table(gains)
-    if path.suffix not in (".csv", ".h"):
-        raise ValueError(f"`path` is {str(path)!r}; gains go to a .csv or a .h file.")
-    if not (name.isascii() and name.isidentifier()):
-        raise ValueError(f"`name` is {name!r}; it must be a name in C.")
-    text = _csv(table) if path.suffix == ".csv" else _header(table, name)
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ValueError(f"cannot write {str(path)!r}: {error.strerror}.") from error
+    checks.instance("gains", gains, CorrectionGains, "`correction_gains` makes")
+    ending = check_ending(path, "table of gains", ("csv", "h")).suffix.lower()
+    table = gain_table(gains)
+    if not (isinstance(name, str) and name.isascii() and name.isidentifier()):
+        raise ValueError(f"`name` is {checks.shorten(name)}; it must be a name in C.")
+    text = _csv(table) if ending == ".csv" else _header(table, name)
+    with replacing(path) as file:
+        file.write(text.encode())
 
 
 def _csv(table: dict[str, np.ndarray]) -> str:

@@ -67,6 +67,8 @@ def zipped(axes: Mapping[str, ArrayLike] | None = None, /, **more: ArrayLike) ->
         axes: arrays of one length, by name.
         more: further ones, `zipped(twist=..., bend=...)`.
     """
+    if axes is not None and not isinstance(axes, Mapping):
+        raise ValueError(f"`axes` is {shorten(axes)}; it must map names to the values of each axis.")
     return Zipped({**(axes or {}), **more})
 
 

@@ -83,6 +83,11 @@ def view(
     wanted = None if target is None else checks.rotations("target", target, tolerance=1e-3)
     if up is not None:
         checks.one_of("up", up, ("x", "y", "z"))
+    if title is not None and not isinstance(title, str):
+        raise ValueError(f"`title` is {checks.shorten(title)}; it must be a string.")
+    told = {} if rows is None else rows
+    if not isinstance(told, Mapping) or not all(isinstance(text, str) for row in told.items() for text in row):
+        raise ValueError(f"`rows` is {checks.shorten(rows)}; it must map names to texts.")
     other = robot if beside_robot is None else checks.instance("beside_robot", beside_robot, Robot, "make_robot makes")
     shown: list[tuple[str, Robot, Clip]] = []
     if isinstance(motion, Comparison):
@@ -102,7 +107,7 @@ def view(
     if getattr(motion, "clearance", None) is not None if clearance is None else clearance:
         shown = [(role, own, clip._replace(nearest=nearest_on_clock(own, clip))) for role, own, clip in shown]
     labels = _labels(names, [role for role, _, _ in shown])
-    data = _data(shown, labels, wanted, View(up=up) if up else default_view(robot), dict(rows or {}))
+    data = _data(shown, labels, wanted, View(up=up) if up else default_view(robot), dict(told))
     data["title"] = title or robot.name
     with replacing(where) as out:
         out.write(page(data).encode())
@@ -162,7 +167,7 @@ def _data(
 def _labels(names: Sequence[str] | None, roles: Sequence[str]) -> list[str]:
     if names is None:
         return list(roles)
-    given = [names] if isinstance(names, str) else list(names)
+    given = [names] if isinstance(names, str) else checks.listing("names", names, "texts")
     if len(given) != len(roles) or not all(isinstance(name, str) for name in given):
         raise ValueError(f"`names` is {checks.shorten(names)}; it must name {', '.join(roles)}, in this order.")
     return [shorten(name) for name in given]

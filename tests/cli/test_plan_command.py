@@ -87,7 +87,7 @@ def test_a_bad_target_is_one_line_and_status_2(capsys, monkeypatch, tmp_path, ta
     ("option", "value", "message"),
     [
         ("--twist-limit", "0", "`twist_limit` is 0.0; it must be one positive number"),
-        ("--max-manoeuvres", "0", "argument --max-manoeuvres: '0' is not a positive whole number"),
+        ("--max-manoeuvres", "0", "`max_manoeuvres` is 0; it must be a positive integer"),
         ("--out", "a.bmp", "cannot write 'a.bmp'"),
         ("--csv", "a.txt", "cannot write 'a.txt'"),
         ("--robot", "missing.urdf", "missing.urdf"),
@@ -98,7 +98,7 @@ def test_a_bad_target_is_one_line_and_status_2(capsys, monkeypatch, tmp_path, ta
         ("--joints", "elbow", "`joints[0]` is 'elbow'"),
         ("--repeats", "many", "argument --repeats: 'many' must be a whole number, or `least`"),
         ("--save", "plan.txt", "cannot write 'plan.txt'"),
-        ("--twist-limit", "17000", "`twist_limit` is 17000 deg, more than two turns; is it in degrees?"),
+        ("--twist-limit", "17000", "`twist_limit` is 17000 degrees, more than two turns"),
     ],
 )
 def test_bad_options(capsys, option, value, message):

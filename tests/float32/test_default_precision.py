@@ -72,3 +72,29 @@ def test_robots_keep_all_their_digits():
     """A robot's own arrays are float64, whatever JAX computes with."""
     assert ROBOT.mass.dtype == np.float64
     assert float(np.sum(ROBOT.mass)) == pytest.approx(0.3, abs=1e-15)
+
+
+def test_a_certificate_says_that_float32_is_not_enough():
+    with pytest.warns(UserWarning, match="jax_enable_x64"):
+        reojax.certify(ROBOT, A, samples=16)
+
+
+def test_planners_compute_in_double_precision_all_the_same():
+    target = Rotation.from_rotvec([0.3, -0.2, 1.0]).as_matrix()
+    plan = reojax.plan(ROBOT, target, twist_limit=4.0, bend_limit=2.0, max_manoeuvres=4)
+    path = reojax.free_path(ROBOT, target, starts=2)
+    turn = reojax.righting(ROBOT, target, momentum=[0, 0, 1e-4], duration=1.0)
+    for found, least in ((plan, 1e-9), (path, 1e-9), (turn, 1e-6)):
+        assert found.converged
+        assert found.error <= least
+
+
+def test_a_calibration_computes_in_double_precision_all_the_same():
+    time = np.arange(40) / 300
+    theta = np.sin(np.outer(time, [40.0, 30.0, 50.0]))
+    true = robots.with_end_inertia(ROBOT, 62e-6)
+    seen = reojax.joints_simulated(true, reojax.make_capture(time, theta)).rotation
+    assert seen.dtype == np.float64
+    fit = reojax.calibrate(ROBOT, reojax.make_capture(time, theta, seen), clock=False)
+    assert fit.values[0] == pytest.approx(62e-6, rel=1e-8)
+    assert not jax.config.values["jax_enable_x64"]

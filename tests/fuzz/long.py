@@ -1,49 +1,69 @@
-"""Hostile input for some minutes, `python tests/fuzz/long.py --minutes 10 [--seed 1]`; status 1 if any was wrong."""
+"""A long run of hostile input: `python tests/fuzz/long.py` (an hour or two), or part of it.
+
+    python tests/fuzz/long.py --kind captures --count 4000 --seed 1
+    python tests/fuzz/long.py --minutes 4 --resume fuzz.json     # again and again until it says done
+
+Status 1 if anything was neither fine nor refused by name. `--package FOLDER` runs another version of reojax.
+"""
 
 import argparse
+import json
 import os
-import random
 import sys
 import tempfile
 import time
+from itertools import islice
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from reojax import session
 
 
 def main() -> int:
-    """Run every argument by every value once, then random ones of all kinds until the time is over."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--seed", type=int, default=int(time.time()))
-    parser.add_argument("--random", action="store_true", help="leave out the round of every argument by every value")
+    """Run all kinds, or one, and print a table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kind", action="append", help="kind of input; all by default")
+    parser.add_argument("--count", type=int, help="how many of each kind")
+    parser.add_argument("--share", type=float, default=1.0, help="part of the long run's counts")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=1e9, help="stop after that time")
+    parser.add_argument("--resume", type=Path, help="file that what was done is kept in, to go on from")
+    parser.add_argument("--package", type=Path, help="folder that `reojax` is imported from")
     args = parser.parse_args()
-    os.environ["REOJAX_CACHE"] = "0"
-    session.compile_quickly()
-    session.start()
-    import hostile
+    sys.path[0:1] = [*([str(args.package.resolve())] if args.package else []), str(Path(__file__).parents[1])]
+    os.environ |= {"REOJAX_CACHE": "0", "JAX_PLATFORMS": "cpu"}
+    os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false")
+    import jax
 
+    jax.config.update("jax_enable_x64", True)
+    from fuzz.kinds import LONG, source
+    from fuzz.tally import KINDS, Tally
+
+    kept = args.resume.resolve() if args.resume else None
+    done = json.loads(kept.read_text()) if kept and kept.exists() else {}
     os.chdir(tempfile.mkdtemp())
-    draw, end = random.Random(args.seed), time.monotonic() + 60 * args.minutes
-    tallies = {kind: hostile.Tally() for kind in ("functions", "captures", "command lines")}
-    for what, call in () if args.random else hostile.hostile_calls():
-        tallies["functions"].judge(what, call)
+    end = time.monotonic() + 60 * args.minutes
+    for kind in args.kind or LONG:
+        tally, before = Tally(), done.setdefault(kind, {"found": []})
+        inputs, wanted = source(kind, args.seed), args.count or int(LONG[kind] * args.share)
+        if inputs is None or before.get("tried", 0) >= wanted:
+            continue
+        for what, call in islice(inputs, before.get("tried", 0), wanted):
+            tally.judge(what, call)
+            if tally["tried"] % 500 == 0:
+                jax.clear_caches()
+            if time.monotonic() > end:
+                break
+        for key, number in tally.items():
+            before[key] = before.get(key, 0) + number
+        before["found"] += tally.found
+        if kept:
+            kept.write_text(json.dumps(done, indent=1))
         if time.monotonic() > end:
             break
-    kinds = {
-        "functions": hostile.hostile_calls(draw),
-        "captures": hostile.hostile_files(draw),
-        "command lines": hostile.hostile_lines(draw),
-    }
-    while time.monotonic() < end:
-        for kind, source in kinds.items():
-            for _ in range(20):
-                what, call = next(source)
-                tallies[kind].judge(str(what)[:200], call)
-    print(f"seed {args.seed}\n{hostile.report(tallies)}")
-    return int(any(tally["wrong"] for tally in tallies.values()))
+    print("| | tried |", " | ".join(KINDS), "|")
+    for kind, row in done.items():
+        print(f"| {kind} |", " | ".join(str(row.get(key, 0)) for key in ("tried", *KINDS)), "|")
+    print(*sorted({text for row in done.values() for text in row["found"]}), sep="\n")
+    print("done" if time.monotonic() < end else "time is over")
+    return int(any(row["found"] for row in done.values()))
 
 
 if __name__ == "__main__":

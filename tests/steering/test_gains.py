@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from helpers.first_variation import first_variation
 
 import reojax
 from reojax import robots, so3
+from reojax.mechanics.variation import first_variation
 from reojax.steering import onboard
 from reojax.steering.tables import gain_table, write_gains
 
@@ -224,7 +224,7 @@ def test_the_onboard_law_takes_an_error_back(lag):
     [
         ({"weights": [1, -1, 1]}, "positive"),
         ({"weights": [1, 1]}, "3 joints"),
-        ({"window": 0.7}, "0 to 0.5"),
+        ({"window": 0.7}, "at most 0.5"),
         ({"left": 0}, "positive"),
         ({"samples": 1}, "at least 2"),
         ({"momentum": [0, 0, 1]}, "trajectory"),
