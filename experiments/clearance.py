@@ -1,13 +1,14 @@
 """What does staying clear of itself cost a robot? Maps of contact, single targets, many targets, and an arm on a bus.
 
     python experiments/clearance.py             # everything
-    python experiments/clearance.py --quick     # coarser maps, fewer targets, no arm, compiled for few calls
-    python experiments/clearance.py --part map  # or targets, many, arm: one part alone
+    python experiments/clearance.py --quick     # coarser maps, fewer targets, no arm, no overhead
+    python experiments/clearance.py --part map  # or targets, many, arm, overhead: one part alone
 
 1. `map`: least clearance of manoeuvres A and B of the prototype over twist within 270 and bend within 120 degrees.
 2. `targets`: half a turn of roll and a quarter turn of pitch with 5 mm of proven clearance, as words and as free paths.
 3. `many`: uniformly random targets with 5 mm and without, at most 5 manoeuvres.
 4. `arm`: a satellite with a 7-joint arm turned by 30 degrees about each axis with a 20 mm margin.
+5. `overhead`: how much longer planning and design take with a clearance, by turns, compilation left out.
 
 Every clearance is proven along the whole path. Figures of a run are in docs/clearance.md.
 """
@@ -24,7 +25,7 @@ from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 import reojax
-from reojax import robots, so3
+from reojax import design, robots, so3
 from reojax.files import check_writable, write_json
 from reojax.plot import draw_map
 
@@ -34,7 +35,7 @@ ROBOT = robots.prototype()
 MARGIN, ARM_MARGIN = 0.005, 0.02
 CORNERS, CALL = 21, 64
 """Corners of five manoeuvres, and paths in one call."""
-PARTS = ("map", "targets", "many", "arm")
+PARTS = ("map", "targets", "many", "arm", "overhead")
 
 
 def proven(paths: np.ndarray) -> np.ndarray:
@@ -131,12 +132,57 @@ def arm(quick: bool) -> list[dict]:
     return rows
 
 
+def overhead(quick: bool) -> dict:
+    """Processor time of planning and design with clearance and without, by turns; targets that no program has seen."""
+    count = 4 if quick else 12
+    turns = Rotation.from_quat(np.random.default_rng(1).normal(size=(count + 1, 4))).as_matrix()
+    loops = {name: loop_problem(margin) for name, margin in (("without", None), ("with", MARGIN))}
+    work = {
+        "plan": lambda turn, margin: reojax.plan(ROBOT, turn, **LIMITS, max_manoeuvres=5, clearance=margin),
+        "free_path": lambda turn, margin: reojax.free_path(ROBOT, turn, **LIMITS, clearance=margin),
+        "design": lambda turn, margin: loops["with" if margin else "without"].solve(
+            8, hold={"target": np.asarray(so3.log(turn))}
+        ),
+    }
+    answer = {}
+    for name, one in work.items():
+        seconds: dict = {None: [], MARGIN: []}
+        for turn, margin in itertools.product(turns, (None, MARGIN)):
+            begun = time.process_time()
+            one(turn, margin)
+            seconds[margin].append(time.process_time() - begun)
+        without, within = (np.array(seconds[margin][1:]) for margin in (None, MARGIN))  # the first ones compile
+        answer[name] = {
+            "without_s": float(without.sum()),
+            "with_s": float(within.sum()),
+            "ratio": float(within.sum() / without.sum()),
+            "ratios": np.sort(within / without).round(2).tolist(),
+        }
+        print(name, answer[name], flush=True)
+    return answer
+
+
+def loop_problem(margin: float | None) -> design.Problem:
+    """The smooth loop of least travel that turns the prototype by a target, with a clearance or without."""
+    robot = ROBOT.replace(lower=-np.array([TWIST, BEND, TWIST]), upper=np.array([TWIST, BEND, TWIST]))
+    loop = design.fourier_loops(robot, 3)
+    target = design.Variable("target", [-np.pi] * 3, [np.pi] * 3)
+    return design.Problem(
+        lambda values: (robot, loop.path(values["loop"])),
+        [loop, target],
+        objective=design.travel(loop),
+        equality=[design.turned_to("target")],
+        inequality=[] if margin is None else [design.clear_by(margin)],
+        steps=1,
+    )
+
+
 def main(out: Path, *, quick: bool = False, part: str | None = None) -> dict:
     """Run the parts, write `clearance.json` and `clearance.png` to `out`, and return the numbers."""
     table, picture = check_writable(out / "clearance.json"), check_writable(out / "clearance.png")
     answer = {}
-    for name, work in zip(PARTS, (maps, targets, many, arm), strict=True):
-        if part == name or (part is None and not (quick and name == "arm")):
+    for name, work in zip(PARTS, (maps, targets, many, arm, overhead), strict=True):
+        if part == name or (part is None and not (quick and name in ("arm", "overhead"))):
             answer[name] = work(quick)
             write_json(table, answer)
     if "map" in answer:

@@ -19,7 +19,7 @@ from reojax._internal.arrays import Array, common_float
 from reojax.collision.chains import Geometry, Structure, acceleration_bound, geometry_of, structure_of, unit_axes
 from reojax.collision.clearance import clearances, radii
 from reojax.collision.placement import pair_ends
-from reojax.collision.segments import segment_distance
+from reojax.collision.segments import quick_distance, segment_distance
 from reojax.robot import Robot
 
 _ROUND = 0.001
@@ -107,9 +107,9 @@ def _least(
     end: jax.Array,
     more: jax.Array,
 ) -> jax.Array:
-    """Least clearance at the samples of each edge (e,), rounded off over the pairs, as `clearance_shortfall` has it.
+    """Least clearance of each edge (e,), rounded off over the pairs, as `clearance_shortfall` has it.
 
-    Its derivative is that at the closest sample of each edge alone, found first: one posture an edge.
+    Its derivative is that at the nearest place of each edge alone, found first: one posture an edge.
     """
     share = _closest(structure, samples, geometry, start, end, more)
     return _at(structure, samples, between, geometry, start, end, more, share)
@@ -142,12 +142,35 @@ def _is_zero(tangent: object) -> bool:
 def _closest(
     structure: Structure, samples: int, geometry: Geometry, start: jax.Array, end: jax.Array, more: jax.Array
 ) -> Float[jax.Array, " e"]:
-    """Where on each edge the closest sample lies, from 0 to 1."""
-    share = jnp.arange(samples + 1, dtype=start.dtype) / samples
-    theta = start.T[:, :, None] + (end - start).T[:, :, None] * share[None, None]
-    ends = pair_ends(structure, geometry, theta.reshape(len(theta), -1))
-    gap = segment_distance(*ends) - (radii(structure, geometry) + more)[:, None]
-    return share[gap.min(0).reshape(-1, samples + 1).argmin(1)]
+    """Where on each edge the robot comes nearest to itself, from 0 to 1.
+
+    That is the nearest sample, moved to where the parabola through it and its two neighbours is least, if the robot is
+    nearer there: so the place goes along smoothly as the edge changes, and little lies between the samples.
+    """
+    edges, reserve = len(start), (radii(structure, geometry) + more)[:, None]
+
+    def gaps(share: jax.Array) -> jax.Array:
+        """Gap of each pair (p, e, k) at places (e, k) of the edges."""
+        theta = start.T[:, :, None] + (end - start).T[:, :, None] * share[None]
+        ends = pair_ends(structure, geometry, theta.reshape(len(theta), -1))
+        return (quick_distance(*ends) - reserve).reshape(-1, *share.shape)
+
+    share = jnp.broadcast_to(jnp.arange(samples + 1, dtype=start.dtype)[None] / samples, (edges, samples + 1))
+    gap = gaps(share).swapaxes(0, 1)
+    flat = gap.reshape(edges, -1).argmin(1)
+    pair, nearest = flat // (samples + 1), flat % (samples + 1)
+    place = nearest.astype(start.dtype)
+    if samples > 1:
+        edge, middle = np.arange(edges), jnp.clip(nearest, 1, samples - 1)
+        before, here, after = (gap[edge, pair, middle + step] for step in (-1, 0, 1))
+        bend = before - 2 * here + after
+        vertex = middle + 0.5 * (before - after) / jnp.where(bend > 0, bend, 1)
+        vertex = jnp.clip(
+            jnp.where(bend > 0, vertex, place), jnp.maximum(place - 1, 0), jnp.minimum(place + 1, samples)
+        )
+        there = gaps(vertex[:, None] / samples)[:, :, 0].min(0)
+        place = jnp.where(there < gap[edge, pair, nearest], vertex, place)
+    return place / samples
 
 
 def _at(

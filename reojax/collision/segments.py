@@ -55,6 +55,21 @@ def closest_parameters(a0: Points, a1: Points, b0: Points, b1: Points) -> tuple[
     return jnp.where(inside, s, best[0]), jnp.where(inside, t, best[1])
 
 
+def quick_distance(a0: Points, a1: Points, b0: Points, b1: Points) -> jax.Array:
+    """Distance between the segments a0-a1 and b0-b1 in a third of the operations, for looking where they are near.
+
+    Never less than the distance; more than it by rounding only, but for segments that are parallel to rounding.
+    """
+    u, v, w = a1 - a0, b1 - b0, a0 - b0
+    uu, vv, uv, uw, vw = materialize((dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w)))
+    determinant = uu * vv - uv * uv
+    s = jnp.clip((uv * vw - vv * uw) / jnp.where(determinant > 0, determinant, 1), 0, 1)
+    t = jnp.clip((uv * s + vw) / jnp.where(vv > 0, vv, 1), 0, 1)
+    s = jnp.clip((uv * t - uw) / jnp.where(uu > 0, uu, 1), 0, 1)
+    gap = w + s[None] * u - t[None] * v
+    return jnp.sqrt(dot(gap, gap))
+
+
 def between(a0: Points, a1: Points, b0: Points, b1: Points) -> Points:
     """Shortest vector from the segment b0-b1 to the segment a0-a1, (3, ...)."""
     s, t = materialize(closest_parameters(a0, a1, b0, b1))

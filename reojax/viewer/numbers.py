@@ -48,7 +48,7 @@ def nearest(clip: Clip) -> str:
         return ""
     place = clip.nearest.place
     gap = 1e3 * place.found
-    how = f"overlap by {_fixed(-gap, 2)} mm" if gap < 0 else f"{np.floor(1e5 * place.distance) / 100:.2f} mm"
+    how = f"{_fixed(-gap, 2)} mm deep in contact" if gap < 0 else f"{np.floor(1e5 * place.distance) / 100:.2f} mm"
     return f"{how}, {place.name}, at {clip.nearest.clock:.4g} {'s' if clip.timed else 'edges'}"
 
 

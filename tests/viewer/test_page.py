@@ -161,3 +161,17 @@ def test_ghost_and_second_motion_share_the_clock(browser, tmp_path):
     for clip, motion in enumerate(motions):
         np.testing.assert_allclose(poses(browser, None, clip)[0], motion.rotation[-1], atol=1e-6)
     assert browser.execute_script("return window.reojax.clock()") == pytest.approx(0.8)
+
+
+def test_the_nearest_points_are_as_far_apart_as_the_library_says(browser, tmp_path):
+    """Where manoeuvre B meets itself the two points of the surfaces are past each other by the depth of the contact."""
+    meeting = reojax.manoeuvre_b(np.deg2rad(-270.0), np.deg2rad(120.0))
+    near = reojax.nearest_parts(PROTOTYPE, meeting)
+    open_page(browser, reojax.view(PROTOTYPE, meeting, tmp_path / "meeting.html", clearance=True))
+    gaps = [
+        (poses(browser, sample), browser.execute_script("return window.reojax.gap()"))[1]
+        for sample in range(int(64 * near.at), int(64 * near.at) + 2)
+    ]
+    share = 64 * near.at % 1
+    assert abs((1 - share) * gaps[0] + share * gaps[1] + near.found) < 1e-3
+    assert "mm deep in contact" in browser.find_element("id", "caption").text

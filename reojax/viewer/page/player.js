@@ -89,7 +89,7 @@ function writeTexts() {
     data.robots.map((robot) => `${robot.name}: ${robot.links.length} links, ${robot.joints.length} joints`).join("; "),
     data.timed ? `${+end.toPrecision(4)} s` : `${+end.toPrecision(4)} edges of a path, which has no time`,
     "free fall, centre of mass at rest",
-    ...data.clips.slice(0, 1).filter((clip) => clip.nearest).map((clip) => `least clearance ${clip.nearest.text}`),
+    ...data.clips.slice(0, 1).filter((clip) => clip.nearest).map((clip) => `least clearance: ${clip.nearest.text}`),
   ].join(" \u00b7 ");
   const solid = data.clips.filter((clip) => !clip.ghost);
   if (solid.length > 1) solid.forEach((clip) => { element(find("labels"), "span").textContent = clip.label; });
