@@ -48,7 +48,7 @@ def proven(paths: np.ndarray) -> np.ndarray:
 
 
 @jax.jit
-def _least(corners: jax.Array) -> jax.Array:
+def _least(corners: jax.Array) -> Any:
     return jax.vmap(lambda points: reojax.path_clearance(ROBOT, reojax.Path(points)).distance)(corners)
 
 

@@ -71,3 +71,11 @@ def pair_name(robot: Robot, pair: int) -> str:
 
     first, second = robot.collision_pairs[pair]
     return f"{name(first)} and {name(second)}"
+
+
+def without_pairs(robot: Robot) -> str:
+    """Why a robot has nothing to keep apart, and what would help, in words."""
+    text = f"{robot.name!r} has no pairs of shapes to keep apart"
+    if not robot.capsule_link:
+        return f"{text}: give it `capsules`."
+    return f"{text}: its capsules are on one link, on links joined directly, or touch at rest; give `collision_pairs`."

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax.collision.chains import geometry_of, structure_of, unit_axes
-from reojax.collision.clearance import pair_name
+from reojax.collision.clearance import pair_name, without_pairs
 from reojax.collision.path_clearance import path_clearance, posture_at
 from reojax.collision.placement import pair_ends
 from reojax.collision.segments import closest_parameters
@@ -51,7 +51,7 @@ def nearest_parts(robot: Robot, path: Path, *, tolerance: float = 1e-4) -> Neare
         ValueError: as `path_clearance`, and for a robot that has no pairs of shapes.
     """
     if not robot.collision_pairs:
-        raise ValueError(f"{robot.name!r} has no pairs of shapes, so no parts of it are nearest: give it `capsules`.")
+        raise ValueError(without_pairs(robot))
     with jax.enable_x64(True):
         robot, path = jax.tree.map(lambda leaf: np.asarray(leaf, float), (robot, path))
         least = path_clearance(robot, path, tolerance=tolerance)

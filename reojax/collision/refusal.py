@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import is_concrete
-from reojax.collision.clearance import clearance as clearance_at, pair_name
+from reojax.collision.clearance import clearance as clearance_at, pair_name, without_pairs
 from reojax.collision.path_clearance import PathClearance, path_clearance
 from reojax.path import Path
 from reojax.robot import Robot
@@ -62,7 +62,5 @@ def _asked(robot: Robot, margin: ArrayLike) -> float:
     """The clearance asked for, of a robot that has pairs to keep apart."""
     wanted = checks.number("clearance", margin, unit="m", least=0.0)
     if not robot.collision_pairs:
-        raise ValueError(
-            f"`clearance` is {wanted:g} m, but {robot.name!r} has no pairs of shapes to keep apart: give it `capsules`."
-        )
+        raise ValueError(f"`clearance` is {wanted:g} m, but {without_pairs(robot)}")
     return wanted

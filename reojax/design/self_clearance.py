@@ -9,6 +9,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from reojax.collision.clearance import without_pairs
 from reojax.collision.constraint import clearance_shortfall
 from reojax.optimisation.optimise import Solution
 from reojax.optimisation.status import Status
@@ -31,7 +32,13 @@ class ClearBy:
     """Asked for on top, where a proof fell short of the margin [m]."""
 
     def __call__(self, outcome: Any) -> jax.Array:
-        """What is missing to the margin, for an inequality."""
+        """What is missing to the margin, for an inequality.
+
+        Raises:
+            ValueError: for a robot without pairs of shapes, on which it would ask for nothing.
+        """
+        if not outcome.robot.collision_pairs:
+            raise ValueError(f"`clear_by` asks for {self.margin:g} m, but {without_pairs(outcome.robot)}")
         wanted = self.margin + self.spare
         return clearance_shortfall(
             outcome.robot, outcome.path.waypoints, wanted, samples=self.samples, between=_BETWEEN

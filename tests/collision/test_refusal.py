@@ -37,3 +37,17 @@ def test_traced_numbers_are_refused():
 def test_robots_without_pairs_are_refused():
     with pytest.raises(ValueError, match="no pairs of shapes"):
         require_clearance(reojax.robots.planar(2), reojax.polygon(np.zeros((2, 1))), 0.01)
+
+
+def test_capsules_that_make_no_pairs_are_told_apart_from_none():
+    caps = [reojax.Capsule(0, (0, 0, 0), (0.1, 0, 0), 0.01), reojax.Capsule(0, (0, 1, 0), (0.1, 1, 0), 0.01)]
+    robot = reojax.make_robot(
+        mass=np.ones(2),
+        com=np.zeros((2, 3)),
+        inertia=np.tile(np.eye(3), (2, 1, 1)),
+        axis=[[0, 0, 1.0]],
+        anchor=np.zeros((1, 3)),
+        capsules=caps,
+    )
+    with pytest.raises(ValueError, match="its capsules are on one link, .* give `collision_pairs`"):
+        require_clearance(robot, reojax.polygon(np.zeros((2, 1))), 0.01)
