@@ -134,7 +134,7 @@ def arm(quick: bool) -> list[dict]:
 
 def overhead(quick: bool) -> dict:
     """Processor time of planning and design with clearance and without, by turns; targets that no program has seen."""
-    count = 4 if quick else 12
+    count = 4 if quick else 8
     turns = Rotation.from_quat(np.random.default_rng(1).normal(size=(count + 1, 4))).as_matrix()
     loops = {name: loop_problem(margin) for name, margin in (("without", None), ("with", MARGIN))}
     work = {

@@ -27,6 +27,8 @@ _ROUND = 0.001
 margin that rest barely has can be kept."""
 _SHARE = 0.5
 """Share of what a pair has beyond the margin that is asked of it at most; rounding off takes some of the rest."""
+_REFINED = 2
+"""How often the nearest place of an edge is made more exact by a parabola."""
 _SAMPLES = 96
 """Samples of a path by default, one an edge at least."""
 _GROUPS = 12
@@ -147,29 +149,39 @@ def _closest(
     That is the nearest sample, moved to where the parabola through it and its two neighbours is least, if the robot is
     nearer there: so the place goes along smoothly as the edge changes, and little lies between the samples.
     """
-    edges, reserve = len(start), (radii(structure, geometry) + more)[:, None]
+    edges, reserve = len(start), radii(structure, geometry) + more
 
-    def gaps(share: jax.Array) -> jax.Array:
-        """Gap of each pair (p, e, k) at places (e, k) of the edges."""
+    def ends_at(share: jax.Array) -> list[jax.Array]:
+        """Ends of the centre lines of all pairs (3, p, e, k) at places (e, k) of the edges."""
         theta = start.T[:, :, None] + (end - start).T[:, :, None] * share[None]
-        ends = pair_ends(structure, geometry, theta.reshape(len(theta), -1))
-        return (quick_distance(*ends) - reserve).reshape(-1, *share.shape)
+        flat = pair_ends(structure, geometry, theta.reshape(len(theta), -1))
+        return [x.reshape(*x.shape[:2], *share.shape) for x in flat]
 
     share = jnp.broadcast_to(jnp.arange(samples + 1, dtype=start.dtype)[None] / samples, (edges, samples + 1))
-    gap = gaps(share).swapaxes(0, 1)
+    gap = (quick_distance(*ends_at(share)) - reserve[:, None, None]).swapaxes(0, 1)
     flat = gap.reshape(edges, -1).argmin(1)
     pair, nearest = flat // (samples + 1), flat % (samples + 1)
     place = nearest.astype(start.dtype)
     if samples > 1:
-        edge, middle = np.arange(edges), jnp.clip(nearest, 1, samples - 1)
-        before, here, after = (gap[edge, pair, middle + step] for step in (-1, 0, 1))
-        bend = before - 2 * here + after
-        vertex = middle + 0.5 * (before - after) / jnp.where(bend > 0, bend, 1)
-        vertex = jnp.clip(
-            jnp.where(bend > 0, vertex, place), jnp.maximum(place - 1, 0), jnp.minimum(place + 1, samples)
-        )
-        there = gaps(vertex[:, None] / samples)[:, :, 0].min(0)
-        place = jnp.where(there < gap[edge, pair, nearest], vertex, place)
+        edge, step = np.arange(edges), 1.0
+        middle = jnp.clip(place, 1, samples - 1)
+        around = [gap[edge, pair, jnp.clip(nearest, 1, samples - 1) + by] for by in (-1, 0, 1)]
+        least = gap[edge, pair, nearest]
+        for _ in range(_REFINED):
+            before, here, after = around
+            bend = before - 2 * here + after
+            vertex = middle + step * 0.5 * (before - after) / jnp.where(bend > 0, bend, 1)
+            vertex = jnp.clip(
+                jnp.where(bend > 0, vertex, place), jnp.maximum(place - 1, 0), jnp.minimum(place + 1, samples)
+            )
+            step = step / 8
+            middle = jnp.clip(vertex, step, samples - step)
+            close = ends_at((middle[:, None] + step * jnp.array([-1.0, 0, 1], start.dtype)[None]) / samples)
+            around = list((quick_distance(*(x[:, pair, edge] for x in close)) - reserve[pair, None]).T)
+        there = around[1]
+        # where centre lines nearly cross, distances are no parabola: the sample, whose place does not move, is better
+        smooth = least > -0.5 * reserve[pair]
+        place = jnp.where(smooth & (there < least), middle, place)
     return place / samples
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -42,8 +43,6 @@ _OFF = 1e6
 """Joint travel [rad] that is worse than any."""
 _SPARE = 0.02
 """Share of the clearance that is asked for on top of it at first, for what lies between samples."""
-_LOOKED_AT = 256
-"""Random polygons near a target among which clear ones are sought."""
 _MOST_TURN = 3.0
 """Largest turn of one loop that is looked for [rad]; the logarithm has no derivative at a half turn."""
 
@@ -177,13 +176,19 @@ class Search:
         return np.take_along_axis(tried, worth.argsort(1)[:, :_FINALISTS, None], 1)
 
     def _starts(self, target: np.ndarray) -> np.ndarray:
-        """Random polygons (s, n) near a target; those that are clear come first."""
+        """Random polygons (s, n) near a target, clear ones where that is asked, as far as there are enough."""
         count = _ROUNDS * self.starts
-        if self.clear is None:
+        if self._clear_rows is None:
             return self.table.near(target, count)
-        x = self.table.near(target, max(_LOOKED_AT, count))
-        kept = self.clear.kept(self.polygons.paths(x, self.freedom))
-        return x[np.argsort(~kept, kind="stable")][:count]
+        x = self.table.near_among(self._clear_rows, target, count)
+        return np.concatenate([x, self.table.near(target, count)])[:count]
+
+    @cached_property
+    def _clear_rows(self) -> np.ndarray | None:
+        """Which polygons of the table are clear at a few samples, if a clearance is asked for."""
+        if self.clear is None:
+            return None
+        return np.flatnonzero(self.clear.sampled(self.polygons.paths(self.table.x, self.freedom)))
 
     def _improve(self, found: np.ndarray, targets: np.ndarray, exact: np.ndarray, tolerance: np.ndarray) -> np.ndarray:
         """The best polygon (m, n) of some for each target, once they are improved to the end."""

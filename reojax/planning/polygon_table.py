@@ -16,6 +16,8 @@ _RANDOM = 4096
 """Random polygons of either kind: on the prototype half as many take 2 % more travel in the median."""
 _PRICE = 60.0
 """Travel that a radian of distance to the target counts for among them [rad]."""
+_STEEP = 600.0
+"""The same among polygons that are clear of the robot itself, the shortest of which hardly move."""
 _KEPT = 8
 """Robots and limits whose polygons are kept."""
 
@@ -34,6 +36,12 @@ class PolygonTable(NamedTuple):
         away = quaternions.angles(quaternions.product(quaternions.from_matrices(target.T[None]), self.turns))
         order = np.argsort((self.lengths + _PRICE * away).reshape(2, -1), axis=1) + [[0], [self.x.shape[0] // 2]]
         return self.x[order.T.ravel()[:count]]
+
+    def near_among(self, rows: np.ndarray, target: Float[np.ndarray, "3 3"], count: int) -> Float[np.ndarray, "c n"]:
+        """Those of some rows which end nearest to a target; that they are short hardly counts, for still ones are."""
+        turns = self.turns[:, rows]
+        away = quaternions.angles(quaternions.product(quaternions.from_matrices(target.T[None]), turns))
+        return self.x[rows[np.argsort(self.lengths[rows] + _STEEP * away)[:count]]]
 
     def farthest(self, axis: Float[np.ndarray, "3"], count: int) -> Float[np.ndarray, "c n"]:
         """Those which turn most about an axis and little otherwise, with that turn as their last variable."""

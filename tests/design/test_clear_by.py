@@ -44,12 +44,12 @@ def test_what_falls_short_between_samples_is_solved_again_or_has_not_converged(m
 
 
 def test_a_robot_without_pairs_is_refused_rather_than_called_clear():
-    robot, variable = reojax.robots.planar(3), reojax.design.Variable("bend", 0.1, 1.0)
+    robot, variable = reojax.robots.planar(2), reojax.design.Variable("bend", 0.1, 1.0)
     posed = reojax.design.Problem(
-        lambda v: (robot, reojax.Path(v["bend"] * np.array([[0.0, 0], [1, 0], [1, 1], [0, 0]]))),
+        lambda v: (robot, reojax.Path(v["bend"] * np.array([[0.0], [1.0], [0.0]]))),
         [variable],
         objective=lambda outcome: outcome.values["bend"],
         inequality=[reojax.design.clear_by(0.01)],
     )
-    with pytest.raises(ValueError, match="`clear_by` asks for 0.01 m, but 'planar3' has no pairs"):
+    with pytest.raises(ValueError, match="`clear_by` asks for 0.01 m, but 'planar2' has no pairs"):
         posed.solve(1)
