@@ -1,14 +1,15 @@
 """An atlas of turns: what twelve robots can do in free fall, what it costs, and how sure that is.
 
     python experiments/atlas.py                        # all of it, some 25 minutes of processor time
-    python experiments/atlas.py --quick                # four robots, three questions, coarse
+    python experiments/atlas.py --quick                # the prototype alone, coarse, without what takes long
     python experiments/atlas.py --part turns --robot Go1
 
 Rows are saved in `atlas.json` as they are found, and an interrupted run goes on where it stopped. Public robots come
 from packages (extra `zoo`); those that are not installed are left out. The numbers of a run are in docs/atlas.md.
 
-Parts: `turns` (1: what one loop does, least travel and time), `bounds` (4: how far from the best), `sensitivity` (3:
-which number matters most), `motors` (6: the thesis's figure 3.2).
+Parts: `turns` (1: what one loop does, least travel and time), `thesis` (2: the thesis's robot with 5 mm of clearance),
+`sensitivity` and `design` (3: which number matters most, and what gradients choose), `bounds` (4: how far from the
+best), `flight` (5: what errors do, open loop and steered), `motors` (6: the thesis's figure 3.2).
 """
 
 import sys
@@ -25,7 +26,7 @@ from tqdm import tqdm
 from reojax.files import check_writable
 
 PARTS = ("turns", "thesis", "bounds", "sensitivity", "design", "flight", "motors")
-QUICK_ROBOTS = ("prototype", "planar4")
+QUICK_ROBOTS = ("prototype",)
 
 
 def main(out: Path, quick: bool, part: str | None, robot: str | None) -> dict[str, Any]:

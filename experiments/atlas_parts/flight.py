@@ -19,7 +19,7 @@ from atlas_parts.store import Row, Store
 from atlas_parts.subjects import Subject
 from reojax import design, so3
 
-INERTIA, SPIN = 0.05, 0.05
+INERTIA, SPIN, RELEASES = 0.05, 0.05, 64
 LONGEST = 4.0
 """Longest motion that is flown [s]."""
 SLOWER = 1.25
@@ -28,9 +28,9 @@ SENSORS = Sensors(np.deg2rad(1), 5, 1, 0.0, 2 * np.pi / 512 / 24, 2e-3)
 
 def jobs(subjects: list[Subject], store: Store, quick: bool) -> list[tuple[str, Callable[[], Row]]]:
     """A row for each robot whose turn is short enough."""
-    turned = store.under("turns")
+    turned = {} if quick else store.under("turns")
     return [
-        (s.name, lambda s=s, name=name: flight(s, name, turned[s.name]["turns"][name], 4 if quick else 64))
+        (s.name, lambda s=s, name=name: flight(s, name, turned[s.name]["turns"][name], RELEASES))
         for s in subjects
         if s.name in turned and (name := _turn(turned[s.name]))
     ]

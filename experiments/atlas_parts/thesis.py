@@ -33,11 +33,11 @@ def jobs(subjects: list[Subject], store: Store, quick: bool) -> list[tuple[str, 
     """Rows of this question; they are about the prototype alone."""
     if not any(subject.name == "prototype" for subject in subjects):
         return []
-    rows = [("share", lambda: share(32 if quick else 1000)), ("manoeuvres", manoeuvres)]
     if quick:
-        return rows
+        return [("manoeuvres", manoeuvres)]
     return [
-        *rows,
+        ("share", lambda: share(1000)),
+        ("manoeuvres", manoeuvres),
         ("least travel, without", lambda: half_turn(None)),
         ("least travel, 5 mm", lambda: half_turn(CLEARANCE)),
         ("least time from A", lambda: fastest(A)),
