@@ -95,18 +95,20 @@ def clear_turns(subject: Subject, targets: np.ndarray, effort: Effort) -> Turns:
     return found
 
 
-def boxed_turns(subject: Subject, targets: np.ndarray, effort: Effort) -> Turns:
+def boxed_turns(subject: Subject, targets: np.ndarray, effort: Effort) -> tuple[Turns, Turns]:
     """Turns that keep the subject's clearance, for robots of many joints and pairs: within boxes where little touches.
 
     The search looks at no pair at all; it is made within smaller and smaller boxes about the posture at rest, and
-    within random ones, and of its answers those count which are proven clear with all pairs.
+    within random ones, and of its answers those count which are proven clear with all pairs. The second answer are the
+    turns of the largest box, clear or not.
     """
-    best = None
+    best = touching = None
     for low, high in _boxes(subject):
-        finder = _Finder(subject, subject.robot, None, effort, (low, high), subject.clearance)
+        finder = _Finder(subject, subject.robot, None, effort, (low, high), subject.clearance, tries=1)
         found = finder.nothing(targets)
-        best = finder.nothing(targets) if best is None else best
         finder.improve(found, targets, np.arange(len(targets)))
+        if best is None:
+            best, touching = finder.nothing(targets), finder.touching
         for k in range(len(targets)):
             if found.reached[k] and not (best.reached[k] and best.travel[k] <= found.travel[k]):
                 for field in ("waypoints", "runs", "travel", "reached"):
@@ -116,7 +118,8 @@ def boxed_turns(subject: Subject, targets: np.ndarray, effort: Effort) -> Turns:
             if found.most[k] > best.most[k]:
                 best.most[k], best.farthest[k] = found.most[k], found.farthest[k]
     assert best is not None
-    return best
+    assert touching is not None
+    return best, touching
 
 
 def _boxes(subject: Subject) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -182,8 +185,12 @@ class _Finder:
         effort: Effort,
         box: tuple[np.ndarray, np.ndarray] | tuple[None, None] = (None, None),
         proof: float | None = None,
+        tries: int = _TRIES,
     ) -> None:
         self.subject, self.few, self.margin, self.effort, self.box = subject, few, margin, effort, box
+        self.tries = tries
+        self.touching: Turns | None = None
+        """What was reached, clear or not."""
         self.proof = margin if proof is None else proof
         with jax.enable_x64(True):
             few = jax.tree.map(lambda leaf: np.asarray(leaf, float), few)
@@ -222,7 +229,8 @@ class _Finder:
         able = np.maximum(found.most[going], tried[0][1])
         runs = np.where(able > _ANY, 1, np.ceil(angles / np.maximum(_USED * able, 1e-2))).astype(int)
         paths = [tried[0][0]]
-        for _ in range(_TRIES):
+        self.touching = self.nothing(targets)
+        for _ in range(self.tries):
             left = np.flatnonzero(~found.reached[going] & (able > 0))
             for number in np.unique(runs[left]):
                 mine = left[runs[left] == number]
@@ -252,12 +260,14 @@ class _Finder:
             self.few, targets[mine], start=self.subject.start, repeats=runs, clearance=self.margin,
             starts=self.effort.starts, max_steps=self.effort.steps, lower=self.box[0], upper=self.box[1],
         )  # fmt: skip
-        reached = answer.converged & self.kept(answer.waypoints)
+        reached, touching = answer.converged & self.kept(answer.waypoints), self.touching
+        assert touching is not None
         for i, k in enumerate(mine):
             found.status[k] = str(answer.status[i])
-            if reached[i]:
-                found.waypoints[k], found.runs[k], found.travel[k] = answer.waypoints[i], runs, answer.travel[i]
-                found.reached[k] = True
+            for turns, done in ((found, reached[i]), (touching, answer.converged[i])):
+                if done:
+                    turns.waypoints[k], turns.runs[k], turns.travel[k] = answer.waypoints[i], runs, answer.travel[i]
+                    turns.reached[k] = True
         return answer.waypoints
 
 
