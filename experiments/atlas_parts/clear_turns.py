@@ -14,7 +14,7 @@ import numpy as np
 import reojax
 from atlas_parts.subjects import Subject
 from reojax.planning.checks import key_of
-from reojax.planning.clear_paths import Clear
+from reojax.planning.clear_paths import Clear, check_clearance
 from reojax.planning.free_polygons import polygons_of
 from reojax.planning.free_search import Search
 from reojax.planning.freedom import freedom_of
@@ -200,8 +200,8 @@ class _Finder:
             self.table = table_of(self.polygons, freedom, key_of(few), 0)
             clear = None
             if margin is not None:
-                clear = Clear(few, margin)
-                self.table = _ClearFirst(*self.table)
+                clear = Clear(few, *check_clearance(few, margin, {"the posture at rest": subject.start}))
+                self.table = _ClearFirst(self.table.x, self.table.turns, self.table.lengths)
                 self.table.kept = lambda x: clear.kept(self.polygons.paths(x, freedom))
             self.search = Search(self.polygons, self.table, freedom, effort.starts, effort.steps, 1e-9, clear)
 
