@@ -13,8 +13,9 @@ import numpy as np
 
 import reojax
 from atlas_parts.subjects import Subject
+from reojax.collision.refusal import check_clearance
 from reojax.planning.checks import key_of
-from reojax.planning.clear_paths import Clear, check_clearance
+from reojax.planning.clear_paths import Clear
 from reojax.planning.free_polygons import polygons_of
 from reojax.planning.free_search import Search
 from reojax.planning.freedom import freedom_of
