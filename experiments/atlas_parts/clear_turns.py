@@ -84,7 +84,7 @@ def clear_turns(subject: Subject, targets: np.ndarray, effort: Effort) -> Turns:
     found = None
     for _ in range(_ROUNDS):
         few = with_capsules(robot, robot.capsules, sorted(pairs)) if pairs else robot
-        finder = _Finder(subject, few, subject.clearance if pairs else None, effort)
+        finder = _Finder(subject, few, subject.clearance if pairs else None, effort, proof=subject.clearance)
         found = finder.nothing(targets) if found is None else found
         going = np.flatnonzero(~found.reached)
         tried = finder.improve(found, targets, going)

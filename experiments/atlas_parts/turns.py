@@ -47,6 +47,7 @@ def turns(subject: Subject, *, quick: bool = False) -> Row:
                   for k, (axis, angle) in enumerate(wanted)},
     }  # fmt: skip
     row["most"] = {axis: _most(axis, alone, wanted) for axis in subject.axes}
+    row["farthest"] = {axis: found.farthest[wanted.index((axis, ANGLES[-1]))].tolist() for axis in subject.axes}
     return row
 
 
