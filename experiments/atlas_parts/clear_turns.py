@@ -96,15 +96,17 @@ def clear_turns(subject: Subject, targets: np.ndarray, effort: Effort) -> Turns:
     return found
 
 
-def boxed_turns(subject: Subject, targets: np.ndarray, effort: Effort) -> tuple[Turns, Turns]:
+def boxed_turns(
+    subject: Subject, targets: np.ndarray, effort: Effort, *, most: int | None = None
+) -> tuple[Turns, Turns]:
     """Turns that keep the subject's clearance, for robots of many joints and pairs: within boxes where little touches.
 
     The search looks at no pair at all; it is made within smaller and smaller boxes about the posture at rest, and
     within random ones, and of its answers those count which are proven clear with all pairs. The second answer are the
-    turns of the largest box, clear or not.
+    turns of the largest box, clear or not. `most` boxes, by default all.
     """
     best = touching = None
-    for low, high in _boxes(subject):
+    for low, high in _boxes(subject)[:most]:
         finder = _Finder(subject, subject.robot, None, effort, (low, high), subject.clearance, tries=1)
         found = finder.nothing(targets)
         finder.improve(found, targets, np.arange(len(targets)))

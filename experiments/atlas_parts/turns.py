@@ -30,10 +30,10 @@ def turns(subject: Subject, *, quick: bool = False) -> Row:
     rank = reojax.controllable_directions(subject.robot, subject.start)
     wanted = [(axis, angle) for axis in subject.axes for angle in (ANGLES[1:] if quick else ANGLES)]
     targets = np.array([np.asarray(so3.exp(np.deg2rad(angle) * subject.axes[axis])) for axis, angle in wanted])
-    if subject.robot.joints <= FEW:
+    if subject.robot.joints <= FEW and not quick:
         touching, found = free_turns(subject, targets, effort), clear_turns(subject, targets, effort)
     else:
-        found, touching = boxed_turns(subject, targets, effort)
+        found, touching = boxed_turns(subject, targets, effort, most=2 if quick else None)
     alone = Turns(*(part.copy() for part in found))
     for answers in (touching, found):
         _double(answers, wanted)
