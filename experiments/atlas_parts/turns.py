@@ -133,7 +133,8 @@ def _cell(turn: Row | None) -> str:
     if turn is None:
         return ""
     without = turn["free"]
-    free = f"({without['travel_deg']:.0f}, {without['runs']} runs)" if without["reached"] else "(not found)"
+    many = f", {without['runs']} runs" if without["runs"] > 1 else ""
+    free = f"({without['travel_deg']:.0f}{many})" if without["reached"] else "(not found)"
     if turn["status"].startswith("unreachable"):
         return "cannot"
     if not turn["reached"]:
