@@ -1,13 +1,15 @@
 """How many starts of a design problem does `design.Problem.solve` finish in a second, beside SLSQP and IPOPT?
 
     python benchmarks/design.py             # some minutes on 2 cores; --quick: fewer starts, one turn
+    python benchmarks/design.py --only spline --turns 1
 
 Prints a table and writes design.json. Closed polygons of least joint travel with the whole net rotation given, on
 several robots, from the same random starts. The others run start by start with the same functions, values and
 reverse-mode derivatives compiled, each point evaluated once. Times are without compilation, by turns, the least of
-three; ratios are of one run. Converged: feasible to 1e-8, and of reojax also stationary to 1e-6. SLSQP is SciPy's;
-IPOPT (`pip install cyipopt`) uses its limited-memory Hessian, and is left out where it is not installed. Set
-OPENBLAS_NUM_THREADS=1: the small BLAS calls of SLSQP otherwise get in each other's way on a busy machine.
+three (`--turns`); ratios are of one run. At most 300 steps of every system. Converged: feasible to 1e-8, and of
+reojax also stationary to 1e-6. SLSQP is SciPy's; IPOPT (`pip install cyipopt`) uses its limited-memory Hessian, and
+is left out where it is not installed. Set OPENBLAS_NUM_THREADS=1: the small BLAS calls of SLSQP otherwise get in each
+other's way on a busy machine.
 
 Expected: several times as many starts a second as either, as many converged, and no worse a best cost.
 """
@@ -22,7 +24,7 @@ from systems.optimisers import PEERS, Ended, Functions
 
 import reojax
 from reojax import design
-from reojax.design import Problem, Variable
+from reojax.design import Loops, Problem, Variable
 from reojax.files import check_writable, write_json
 from reojax.robots import prototype
 from reojax.robots.random import random_robot
@@ -31,15 +33,14 @@ TARGET = Variable("target", [-7.0] * 3, [7.0] * 3, "rad")
 OURS = "reojax"
 
 
-def least_travel(robot: reojax.Robot, corners: int) -> Problem:
-    """Polygons of least joint travel to a net rotation that is held."""
-    loop = design.polygons(robot, corners)
+def least_travel(robot: reojax.Robot, loop: Loops, *, steps: int = 4) -> Problem:
+    """Loops of least joint travel to a net rotation that is held."""
     return Problem(
         lambda values: (robot, loop.path(values["loop"])),
         [loop, TARGET],
         objective=design.travel(loop),
         equality=[design.turned_to("target")],
-        steps=4,
+        steps=steps,
     )
 
 
@@ -59,21 +60,28 @@ def within_a_degree(robot: reojax.Robot, corners: int) -> Problem:
 def tasks() -> dict[str, tuple[Problem, dict[str, Any]]]:
     """Problems and what is held in them."""
     five, seven = (random_robot(joints, joints, limits=(-1.5, 1.5)) for joints in (5, 7))
+    polygons, half_turn = design.polygons, {"target": [0.0, 0.0, np.pi]}
+    spline = design.spline_loops(prototype(), 8, samples=48)
     return {
-        "prototype, half turn of roll, 5 corners": (least_travel(prototype(), 5), {"target": [0.0, 0.0, np.pi]}),
+        "prototype, half turn of roll, 5 corners": (least_travel(prototype(), polygons(prototype(), 5)), half_turn),
         "prototype, 120 deg of roll, 3 corners, off axis at most 1 deg": (within_a_degree(prototype(), 3), {}),
-        "random robot of 5 joints, 3 corners": (least_travel(five, 3), {"target": [0.3, -0.2, 0.5]}),
-        "random robot of 7 joints, 4 corners": (least_travel(seven, 4), {"target": [0.0, 0.4, 0.7]}),
+        "random robot of 5 joints, 3 corners": (least_travel(five, polygons(five, 3)), {"target": [0.3, -0.2, 0.5]}),
+        "random robot of 7 joints, 4 corners": (least_travel(seven, polygons(seven, 4)), {"target": [0.0, 0.4, 0.7]}),
+        "prototype, half turn of roll, spline of 8 points a joint": (
+            least_travel(prototype(), spline, steps=1),
+            half_turn,
+        ),
     }
 
 
-def main(out: Path, *, quick: bool) -> None:
+def main(out: Path, *, quick: bool, only: list[str] | None, turns: int) -> None:
     """Measure, print and write."""
     result = check_writable(out / "design.json")
     before, rows = machine(), []
     for name, (problem, held) in tasks().items():
-        say(f"{name} ...")
-        rows += _compare(name, problem, held, starts=8 if quick else 64, turns=1 if quick else 3)
+        if only is None or any(text in name for text in only):
+            say(f"{name} ...")
+            rows += _compare(name, problem, held, starts=8 if quick else 64, turns=1 if quick else turns)
     print("| problem | by | starts a second | converged | at the best | best cost | gradients | reojax is faster by |")
     print("|---|---|--:|--:|--:|--:|--:|--:|")
     for row in rows:
@@ -125,4 +133,7 @@ def _at_best(ended: Ended) -> int:
 
 
 if __name__ == "__main__":
-    run(main, options(__doc__))
+    parser = options(__doc__)
+    parser.add_argument("--only", nargs="+", metavar="TEXT", help="problems whose names contain one of these")
+    parser.add_argument("--turns", type=int, default=3, metavar="N", help="how often (default: 3)")
+    run(main, parser)

@@ -25,14 +25,14 @@ BATCH = 64
 _TEXT = "{joints:3d} joints {of:9s} {designs:3d} designs {compile_s:6.1f} s {run_us:9.1f} us"
 
 
-def main(out: Path, *, quick: bool) -> None:
+def main(out: Path, *, quick: bool, joints: list[int]) -> None:
     """Measure, print and write."""
     result = check_writable(out / "long_robots.json")
     rows = []
-    for joints in (3, 12) if quick else JOINTS:
-        robot = random_robot(7, joints, branched=True)
-        robot = robot.replace(axis=np.eye(3)[np.arange(joints) % 3])
-        points = np.random.default_rng(7).uniform(-1.5, 1.5, (BATCH, 5, joints))
+    for count in (3, 12) if quick else joints:
+        robot = random_robot(7, count, branched=True)
+        robot = robot.replace(axis=np.eye(3)[np.arange(count) % 3])
+        points = np.random.default_rng(7).uniform(-1.5, 1.5, (BATCH, 5, count))
         points[:, -1] = points[:, 0]
 
         def net(corners: jax.Array, robot: reojax.Robot = robot) -> jax.Array:
@@ -42,15 +42,11 @@ def main(out: Path, *, quick: bool) -> None:
             return jax.grad(lambda c: (net(c) * jnp.arange(9.0).reshape(3, 3)).sum())(corners)
 
         for name, function in (("value", net), ("gradient", slope)):
-            for count, call, given in ((1, function, points[0]), (BATCH, jax.vmap(function), points)):
+            for designs, call, given in ((1, function, points[0]), (BATCH, jax.vmap(function), points)):
                 compiled, seconds = _compile(call, given)
-                row = {"joints": joints, "of": name, "designs": count, "compile_s": seconds}
-                rows.append(row | {"run_us": 1e6 * _least(compiled, given) / count})
-                print(
-                    "{joints:3d} joints {of:9s} {designs:3d} designs {compile_s:6.1f} s {run_us:9.1f} us".format(
-                        **rows[-1]
-                    )
-                )
+                row = {"joints": count, "of": name, "designs": designs, "compile_s": seconds}
+                rows.append(row | {"run_us": 1e6 * _least(compiled, given) / designs})
+                print(_TEXT.format(**rows[-1]), flush=True)
     write_json(result, {"machine": machine(), "rows": rows})
 
 
@@ -71,4 +67,6 @@ def _least(function: Callable, given: np.ndarray) -> float:
 
 
 if __name__ == "__main__":
-    run(main, options(__doc__))
+    parser = options(__doc__)
+    parser.add_argument("--joints", type=int, nargs="+", default=JOINTS, metavar="N", help="numbers of joints")
+    run(main, parser)

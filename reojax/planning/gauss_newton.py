@@ -39,7 +39,7 @@ class Iterate(NamedTuple):
     """Whether more steps may bring it to the target."""
 
 
-@partial(jax.jit, compiler_options=LEAN_COMPILE)
+@jax.jit
 def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Iterate:
     """Bring words to their targets by Levenberg-Marquardt steps, clipped to the box."""
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)

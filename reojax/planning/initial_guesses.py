@@ -61,7 +61,7 @@ class GuessTable:
 
     def reaches(self, target: Float[np.ndarray, "4 m"], slots: int, within: float) -> Bool[np.ndarray, " m"]:
         """Whether a word of `slots` loops ends within a chord of each target."""
-        return self._words_of(slots).nearest(target, 1)[0][:, 0] < within
+        return self._words_of(slots).nearest(target, 1, within)[0][:, 0] < within
 
     def near(self, target: Float[np.ndarray, "4 m"], slots: int, count: int) -> Starts:
         """Words of `slots` loops near each target, (..., m, count), without regard to the quaternion's sign.
@@ -98,9 +98,9 @@ class _Words:
         self._tree: Any = None
 
     def nearest(
-        self, target: Float[np.ndarray, "4 m"], count: int
+        self, target: Float[np.ndarray, "4 m"], count: int, within: float = np.inf
     ) -> tuple[Float[np.ndarray, "m count"], Int[np.ndarray, "m count"]]:
-        """Chords to the nearest words of each target, and which they are; nearest first."""
+        """Chords to the nearest words of each target, and which they are; nearest first, beyond `within` left open."""
         if self._tree is None and target.shape[1] > _FEW:
             from scipy.spatial import KDTree  # importing it takes as long as it saves with few targets
 
@@ -109,7 +109,9 @@ class _Words:
             found = [_nearest(self._q, t[:, None], count) for t in target.T]
             chords, words = ([part[i] for part in found] for i in (0, 1))
             return np.reshape(chords, (-1, count)), np.reshape(np.array(words, int), (-1, count))
-        chord, word = (a.reshape(-1, count) for a in self._tree.query(target.T, k=count, workers=-1))
+        chord, word = (
+            a.reshape(-1, count) for a in self._tree.query(target.T, k=count, distance_upper_bound=within, workers=-1)
+        )
         return chord, word % self._q.shape[1]
 
 
