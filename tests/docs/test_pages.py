@@ -47,6 +47,7 @@ COMMANDS = [
 )
 def test_python_blocks_run_and_print_what_they_say(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("REOJAX_CACHE", "0")
     (tmp_path / "docs").symlink_to(ROOT / "docs")
     space: dict = {"__name__": page.stem}
     for kind, code, output in blocks(page):
