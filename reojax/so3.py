@@ -23,7 +23,7 @@ from jax import lax
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._internal.arrays import Array, refuse_lookalikes
+from reojax._internal.arrays import Array, is_concrete, refuse_lookalikes
 from reojax._internal.checks import shorten
 from reojax._internal.quaternions import outer_rows
 
@@ -234,6 +234,8 @@ def _floats(value: ArrayLike | float | int, name: str, shape: tuple[int, ...]) -
         raise ValueError(f"`{name}` has shape {array.shape}; it must be {shape}.")
     if jnp.issubdtype(array.dtype, jnp.complexfloating):
         raise ValueError(f"`{name}` has dtype {array.dtype}; it must be real.")
+    if is_concrete(array) and np.isnan(np.asarray(array)).any():
+        raise ValueError(f"`{name}` has an entry that is not a number: {shorten(np.asarray(array).tolist())}.")
     return array if jnp.issubdtype(array.dtype, jnp.floating) else array.astype(float)
 
 

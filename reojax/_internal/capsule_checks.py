@@ -51,7 +51,7 @@ def check_pairs(pairs: Any, capsule_link: tuple[int, ...]) -> tuple[tuple[int, i
     """
     found = []
     for i, pair in enumerate(listing("collision_pairs", pairs, "pairs of numbers of capsules")):
-        numbers = tuple(pair) if isinstance(pair, tuple | list | np.ndarray) else ()
+        numbers = tuple(pair) if isinstance(pair, tuple | list | np.ndarray) and np.ndim(pair) else ()
         if len(numbers) != 2 or not all(isinstance(n, int | np.integer) and not isinstance(n, bool) for n in numbers):
             raise ValueError(f"collision_pairs[{i}] is {shorten(pair)}; it must be two numbers of capsules.")
         first, second = sorted(map(int, numbers))

@@ -71,7 +71,12 @@ def check_energy(fields: dict[str, Any]) -> tuple[str, ...]:
 
 def _weakest(fields: dict[str, Any], theta: np.ndarray) -> str | None:
     """What moves in the motion of least energy, where that energy is not positive."""
-    matrix = energy_matrix(fields, theta)
+    with np.errstate(over="ignore", invalid="ignore"):
+        matrix = energy_matrix(fields, theta)
+    if not np.isfinite(matrix).all():
+        raise ValueError(
+            f"masses, lengths or inertias of {fields['name']!r:.60} are so large that its kinetic energy is no number."
+        )
     size = np.diag(matrix).copy()
     names = [f"the base about {axis}" for axis in "xyz"] + [f"joint {name!r:.60}" for name in fields["joint_names"]]
     largest = size.max(initial=0.0)

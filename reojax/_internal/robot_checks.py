@@ -64,7 +64,8 @@ def _inertias(value: Any, names: Sequence[str]) -> np.ndarray:
     for i, (matrix, name) in enumerate(zip(inertia, names, strict=True)):
         if np.abs(matrix - matrix.T).max() > _TOLERANCE * np.abs(matrix).max():
             raise ValueError(f"inertia[{i}] ({name}) is {matrix.tolist()}; it must be symmetric.")
-        small, middle, large = moments = np.linalg.eigvalsh(0.5 * (matrix + matrix.T))
+        size = np.abs(matrix).max() or 1.0  # moments near the end of the range of floats have squares beyond it
+        small, middle, large = moments = size * np.linalg.eigvalsh(0.5 * (matrix + matrix.T) / size)
         if breaks_triangle(moments, NOISE * np.abs(inertia).max()):
             raise ValueError(
                 f"inertia[{i}] ({name}) has principal moments {small:.6g}, {middle:.6g}, {large:.6g} kg m^2; of "

@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
 from reojax.collision.chains import Geometry, Structure, geometry_of, structure_of, unit_axes
 from reojax.collision.placement import pair_ends
 from reojax.collision.segments import segment_distance
+from reojax.mechanics.input_checks import check_robot
 from reojax.robot import Robot
 
 
@@ -32,7 +32,7 @@ def clearance(robot: Robot, theta: ArrayLike) -> Float[Array, " p"]:
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
-    checks.instance("robot", robot, Robot, "`make_robot` makes")
+    check_robot(robot)
     angles = as_numbers("theta", theta)
     if angles.shape != (robot.joints,):
         raise ValueError(

@@ -16,6 +16,9 @@ from reojax._internal import checks
 from reojax._internal.arrays import as_numbers, is_concrete
 from reojax.robot import Robot
 
+_MOST = 1e100
+"""Largest mass, factor or inertia; squares of larger ones are no numbers."""
+
 
 def with_mass(robot: Robot, link: int | str, mass: ArrayLike) -> Robot:
     """Another mass [kg] of the same shape: the link's inertia is scaled with it.
@@ -39,6 +42,8 @@ def with_com_offset(robot: Robot, link: int | str, offset: ArrayLike) -> Robot:
     index, move = _number(robot, "link", link), as_numbers("offset", offset)
     if move.shape != (3,):
         raise ValueError(f"`offset` has shape {move.shape}; it must be (3,), in m.")
+    if is_concrete(move) and not np.isfinite(move).all():
+        raise ValueError(f"`offset` is {np.asarray(move).tolist()}; it must be finite, in m.")
     return robot.replace(com=_set_link(robot.com, index, robot.com[index] + move))
 
 
@@ -103,11 +108,16 @@ def _set_link(array: Any, index: int, value: Any) -> jax.Array:
 def _number(robot: Robot, kind: str, value: int | str) -> int:
     """Number of a link or joint of what has to be a robot."""
     checks.instance("robot", robot, Robot, "`make_robot` makes")
+    if np.shape(robot.mass) != (robot.links,):
+        raise ValueError(
+            f"`robot.mass` has shape {np.shape(robot.mass)}; of one robot of this tree it must be ({robot.links},); "
+            "for a stack of robots use jax.vmap."
+        )
     return checks.index_of(kind, value, robot.link_names if kind == "link" else robot.joint_names, kind)
 
 
 def _positive(entry: str, value: ArrayLike) -> Any:
     number = as_numbers(entry, value)
-    if number.shape or (is_concrete(number) and not 0 < number < np.inf):
-        raise ValueError(f"`{entry}` is {checks.shorten(value)}; it must be one positive, finite number.")
+    if number.shape or (is_concrete(number) and not 0 < number < _MOST):
+        raise ValueError(f"`{entry}` is {checks.shorten(value)}; it must be one positive number below {_MOST:g}.")
     return number

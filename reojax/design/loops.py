@@ -60,6 +60,8 @@ def rectangles(
     Raises:
         ValueError: for a start outside of the joint limits, a joint without limits, or no layout.
     """
+    if not isinstance(lead, bool | np.bool_):
+        raise ValueError(f"`lead` is {checks.shorten(lead)}; it must be True or False.")
     layout = layout_of(checks.instance("robot", robot, Robot, "`make_robot` makes")) if layout is None else layout
     check_layout(layout)
     if layout.joints != robot.joints:
@@ -145,6 +147,8 @@ def limits_of(robot: Robot, start: ArrayLike, name: str = "loop") -> tuple[Float
     if not isinstance(name, str):
         raise ValueError(f"`name` is {checks.shorten(name)}; it must be a string.")
     checks.on_host("robot", robot, "what makes loops")
+    if not robot.joints:
+        raise ValueError(f"{robot.name!r} has no joints; a loop moves some.")
     low, high = np.asarray(robot.lower, float), np.asarray(robot.upper, float)
     for k in np.flatnonzero(~(np.isfinite(low) & np.isfinite(high))):
         raise ValueError(f"joint {robot.joint_names[k]!r} has no limits; loops need finite `lower` and `upper`.")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import as_numbers
-from reojax._internal.checks import shorten
+from reojax._internal.checks import number, shorten
 from reojax._internal.files import check_ending, replacing
 from reojax.captures.columns import read_header, split
 from reojax.files.points import Movement, points_of
@@ -95,8 +95,10 @@ def write_trajectory(
         if array.shape != (len(when), robot.joints):
             expected = (len(when), robot.joints)
             raise ValueError(f"`{names[key]}` has shape {array.shape}; for {robot.name!r} it must be {expected}.")
-    if not (np.isfinite(delay) and delay >= 0):
-        raise ValueError(f"`delay` is {shorten(delay)}; it must be a time in seconds, not negative.")
+    try:
+        delay = number("delay", delay, unit="s", least=0.0)
+    except ValueError:
+        raise ValueError(f"`delay` is {shorten(delay)}; it must be a time in seconds, not negative.") from None
     nanoseconds = np.round((when - when[0] + delay) * 1e9).astype(np.int64)
     if (np.diff(nanoseconds) < 1).any():
         point = int(np.argmax(np.diff(nanoseconds) < 1)) + 1

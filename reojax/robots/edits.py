@@ -30,7 +30,7 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
     Raises:
         ValueError: if the robot has not four links, or `inertia` is not one positive, finite number.
     """
-    instance("robot", robot, Robot, "`make_robot` makes")
+    _one(robot)
     if robot.links != 4:
         raise ValueError(f"{robot.name!r} has {robot.links} links; end links are defined for the four-link robot.")
     as_numbers("inertia", inertia)
@@ -87,6 +87,7 @@ def with_gear_ratio(robot: Robot, ratio: ArrayLike | Mapping[str | int, ArrayLik
     Raises:
         ValueError: if `ratio` has another shape or is not finite, or names no joint.
     """
+    _one(robot)
     return robot.replace(gear_ratio=_per_joint(robot, "ratio", ratio, robot.gear_ratio))
 
 
@@ -103,6 +104,7 @@ def with_rotor_inertia(robot: Robot, inertia: ArrayLike | Mapping[str | int, Arr
     Raises:
         ValueError: if `inertia` has another shape, is negative or not finite, or names no joint.
     """
+    _one(robot)
     return robot.replace(rotor_inertia=_per_joint(robot, "inertia", inertia, robot.rotor_inertia, least=0.0))
 
 
@@ -122,7 +124,7 @@ def with_limits(
     Raises:
         ValueError: naming the joint whose limits leave no room; or another shape, or a name that no joint has.
     """
-    instance("robot", robot, Robot, "`make_robot` makes")
+    _one(robot)
     low, high = (
         present if given is None else _per_joint(robot, entry, given, present, finite=False)
         for entry, given, present in (("lower", lower, robot.lower), ("upper", upper, robot.upper))
@@ -145,7 +147,7 @@ def with_capsules(robot: Robot, capsules: Sequence[Capsule], collision_pairs: An
     Raises:
         ValueError: naming the capsule or pair, and the rule it breaks.
     """
-    instance("robot", robot, Robot, "`make_robot` makes")
+    _one(robot)
     shapes = check_capsules(capsules, robot.link_names)
     if collision_pairs is None:
         placed = {"parent": robot.parent, "anchor": np.asarray(robot.anchor), **shapes}
@@ -155,10 +157,19 @@ def with_capsules(robot: Robot, capsules: Sequence[Capsule], collision_pairs: An
     return dataclasses.replace(robot, **shapes, collision_pairs=pairs)
 
 
+def _one(robot: Robot) -> None:
+    """Refuse what is no robot, or several in one: of those `jax.vmap` takes one at a time."""
+    instance("robot", robot, Robot, "`make_robot` makes")
+    if np.shape(robot.gear_ratio) != (robot.joints,):
+        raise ValueError(
+            f"`robot.gear_ratio` has shape {np.shape(robot.gear_ratio)}; of one robot of this tree it must be "
+            f"({robot.joints},); for a stack of robots use jax.vmap."
+        )
+
+
 def _per_joint(
     robot: Robot, entry: str, value: Any, present: Any, *, least: float = -np.inf, finite: bool = True
 ) -> Any:
-    instance("robot", robot, Robot, "`make_robot` makes")
     for number in value.values() if isinstance(value, Mapping) else (value,):
         as_numbers(entry, number)
     if isinstance(value, Mapping):

@@ -4,8 +4,6 @@ import random
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from fuzz import damage, lines, subjects
-
 Source = Iterator[tuple[str, Callable[[], Any]]]
 LONG = {
     "functions that compile little": 8000,
@@ -26,9 +24,15 @@ def source(kind: str, seed: int) -> Source | None:
     """Inputs of a kind without end, the same for the same seed; None where this version has nothing of that kind."""
     draw = random.Random(f"{kind} {seed}")
     if kind.startswith("functions"):
+        from fuzz import subjects
+
         return subjects.calls(subjects.DEAR if kind.endswith("compile") else subjects.CHEAP, draw)
     if kind.startswith("command lines"):
+        from fuzz import lines
+
         quick = ("sweep", "merge", "export", "show", "view")
         return lines.lines(draw, quick if kind.endswith("little") else ("simulate", "time", "compare", "plan"))
+    from fuzz import damage
+
     there = damage.subjects(kind)
     return damage.files(*there[kind], draw) if kind in there else None
