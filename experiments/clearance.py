@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from common.script import options, run
 from matplotlib.figure import Figure
@@ -48,8 +49,8 @@ def proven(paths: np.ndarray) -> np.ndarray:
 
 
 @jax.jit
-def _least(corners: jax.Array) -> Any:
-    return jax.vmap(lambda points: reojax.path_clearance(ROBOT, reojax.Path(points)).distance)(corners)
+def _least(corners: jax.Array) -> jax.Array:
+    return jax.vmap(lambda points: jnp.asarray(reojax.path_clearance(ROBOT, reojax.Path(points)).distance))(corners)
 
 
 def maps(quick: bool) -> dict:

@@ -27,11 +27,13 @@ from reojax.mechanics.momentum import MomentumMatrices, angular_momentum, connec
 from reojax.models.json_file import save_robot
 from reojax.models.load import load_robot
 from reojax.models.mjcf_writer import write_mjcf
+from reojax.motion.closed_loop import Tracking, track
 from reojax.motion.fastest import Fastest, fastest_loop, free_law, overlap
 from reojax.motion.least_time import LeastTime, minimum_stretch, minimum_time
 from reojax.motion.motor import RE_MAX_17, Motor, no_load_speed, stall_torque, with_motors
-from reojax.motion.pid import Gains, Tracking, gains, track
-from reojax.motion.release import Release, Released, ReleaseSpread, release_spread, released
+from reojax.motion.pid import Gains, gains
+from reojax.motion.release import Release, Released, released
+from reojax.motion.release_spread import ReleaseSpread, release_spread
 from reojax.motion.simulation import Motion, simulate
 from reojax.motion.time_laws import Law, minimum_jerk, quintic, trapezoid
 from reojax.motion.trajectory import Trajectory, along, through

@@ -11,7 +11,8 @@ import reojax
 from reojax import plot, robots
 from reojax.captures.alignment import interpolate
 from reojax.mechanics.attitude import tilt_and_roll, zxz_beside, zxz_without_jumps
-from reojax.motion.pid import FEEDFORWARD_BANDWIDTH, PID_BANDWIDTH, Tracking, gains, track
+from reojax.motion.closed_loop import Tracking, track
+from reojax.motion.pid import FEEDFORWARD_BANDWIDTH, PID_BANDWIDTH, gains
 from reojax.motion.release import released
 
 FRICTION = 1e-4  # N m on the rotor; chosen, some 10 mA of no-load current
@@ -69,7 +70,7 @@ def section(out: Path, *, quick: bool, durations: Sequence[float] = DURATIONS) -
     robot = robots.prototype()
     result: dict[str, Any] = {"durations_s": list(durations), "cases": [], "rows": []}
     for manoeuvre, trajectory in plans(durations).items():
-        ideal = released(robot, trajectory, steps=64)
+        ideal = released(robot, trajectory, samples=64)
         for name, (forward, bandwidth) in CASES.items():
             done = track(robot, trajectory, motors(), gains(robot, bandwidth), feedforward=forward, settle=SETTLE)
             done = jax.tree.map(np.asarray, done)

@@ -2,19 +2,10 @@
 
 import argparse
 import difflib
-import math
 import re
 import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
-
-LARGEST_ANGLE = 36000.0
-"""Largest amplitude at the command line [deg]: a hundred turns."""
-SHORTEST = 1e-4
-"""Shortest duration at the command line [s]; a power of a shorter one may not be a number."""
-LONGEST = 1e4
-"""Longest duration at the command line [s]."""
-
 
 OPTIONS: dict[str, None] = {}
 """Options of all subcommands."""
@@ -45,19 +36,6 @@ class Parser(argparse.ArgumentParser):
         (file or sys.stderr).write(message)
 
 
-def degrees(text: str) -> float:
-    """Read an angle in degrees (an argparse type)."""
-    try:
-        angle = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
-    if not math.isfinite(angle):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
-    if abs(angle) > LARGEST_ANGLE:
-        raise argparse.ArgumentTypeError(f"{text!r} is beyond {LARGEST_ANGLE:g} degrees")
-    return angle
-
-
 def join_negative_values(arguments: Sequence[str]) -> list[str]:
     """Make argparse see all negative numbers: `--bend=-1e2`; further ones of an option begin with a space."""
     result: list[str] = []
@@ -69,30 +47,6 @@ def join_negative_values(arguments: Sequence[str]) -> list[str]:
         else:
             result.append(argument)
     return result
-
-
-def in_degrees(text: str) -> str:
-    """A message with its angles in degrees: `1.5 rad`, `-1 to 1 rad` and `-1..1 rad`."""
-    number = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|[-+]?inf"
-    angles = re.compile(rf"(?<![\w.])({number})(?:( to |\.\.)({number}))? rad\b(?!/)")
-
-    def turned(found: re.Match[str]) -> str:
-        first, between, last = found.groups()
-        ends = [f"{math.degrees(float(end)):.5g}" for end in (first, last) if end]
-        return f"{(between or '').join(ends)} degrees"
-
-    asked = re.sub(r"[;:] (is it in|are these) degrees\?", "", text)
-    return re.sub(r"\bin rad\b", "in degrees", angles.sub(turned, asked))
-
-
-def version() -> str:
-    """Version of the installed package."""
-    from importlib import metadata
-
-    try:
-        return metadata.version("reojax")
-    except metadata.PackageNotFoundError:
-        return "(not installed)"
 
 
 def _negative(text: str) -> bool:

@@ -1,44 +1,22 @@
-"""Joints under control, in closed loop: PID, alone or on top of precomputed torques (thesis 1.8).
+"""PID control of joints: its gains, by bandwidth. What they make of a motion is `closed_loop`.
 
-At every sample the controller reads the encoders, which count turns of the motors, and commands torques of the
-motors, held until the next sample:
+    M = (Kp e + Ki int e + Kd de/dt) / N
 
-    M = (Kp e + Ki int e + Kd de/dt) / N  (+ the torque that the planned motion takes, precomputed).
-
-Each motor gives what its supply allows at its speed `w`, `|resistance M / k + k w| <= supply`, loses drag and
-friction, accelerates its own rotor and drives the joint through the gear, which takes its share. Between samples the
-joints obey `forward_dynamics`; the orientation is only observed, it follows from `A omega = B theta_dot + R^T H`, so
-that momentum is conserved by construction. Both are integrated by Runge-Kutta steps of order four, on the rotation
-vector of each step.
+with the joint's error `e` and its gear ratio `N`, in torques of the motors.
 """
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
-from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
-from reojax._internal.linalg import solve_positive, solve_without_exchange
-from reojax.mechanics.dynamics import joint_inertia, joint_inertia_of_pose, joint_load, rotor_inertia_of_pose
-from reojax.mechanics.integrators import RK4, runge_kutta_step
-from reojax.mechanics.kinematics import kinematics
-from reojax.mechanics.own_units import without_names
-from reojax.motion.motor import Motor, check_motors, drive, per_joint
-from reojax.motion.trajectory import Trajectory
+from reojax._internal.arrays import Array, as_numbers, is_concrete
+from reojax.mechanics.dynamics import joint_inertia
 from reojax.robot import Robot
-
-COUNTS = 512.0
-"""Counts of an encoder to a turn of its motor, before the gear (thesis 2.6)."""
-_MOST_SAMPLES = 10**7
-_CREEP = 1.0
-"""Speed of a rotor over which friction changes its sign smoothly [rad/s]."""
 
 
 class Gains(NamedTuple):
@@ -55,31 +33,10 @@ class Gains(NamedTuple):
 PID_BANDWIDTH, FEEDFORWARD_BANDWIDTH = 320.0, 65.0
 """Tuned bandwidths [rad/s] of the prototype's controllers, PID alone and on top of precomputed torques.
 
-By `experiments/_drop_tower_tracking.py`: of 13 from 25 to 400 rad/s, the least one whose RMS error of the joints over
-manoeuvres A and B at 270/120 degrees in 0.62 s is within 2 % of the best (rounded): RE-max 17 at 12 V with
+By `experiments/drop_tower_parts/tracking.py`: of 13 from 25 to 400 rad/s, the least one whose RMS error of the joints
+over manoeuvres A and B at 270/120 degrees in 0.62 s is within 2 % of the best (rounded): RE-max 17 at 12 V with
 friction, 1 ms, 512 counts.
 """
-
-
-class Tracking(NamedTuple):
-    """A motion under control, at every sample."""
-
-    time: Float[Array, " m"]
-    """Time [s], from 0."""
-    planned: Float[Array, "m j"]
-    """Joint angles as planned [rad]."""
-    theta: Float[Array, "m j"]
-    """Joint angles [rad]."""
-    theta_dot: Float[Array, "m j"]
-    """Joint rates [rad/s]."""
-    rotation: Float[Array, "m 3 3"]
-    """Orientation of the base; starts at the identity."""
-    command: Float[Array, "m j"]
-    """Torque that the controller asks of each motor from this sample on [N m]."""
-    motor_torque: Float[Array, "m j"]
-    """Torque that each motor gives at this sample [N m]."""
-    saturated: Bool[Array, "m j"]
-    """Whether that is less than is asked for."""
 
 
 def gains(robot: Robot, bandwidth: ArrayLike, theta: ArrayLike | None = None) -> Gains:
@@ -108,101 +65,8 @@ def gains(robot: Robot, bandwidth: ArrayLike, theta: ArrayLike | None = None) ->
     return Gains(3 * inertia * p**2, inertia * p**3, 3 * inertia * p)
 
 
-def track(
-    robot: Robot,
-    trajectory: Trajectory,
-    motors: Motor,
-    gains: Gains,
-    *,
-    feedforward: bool = False,
-    sample_time: float = 1e-3,
-    counts: float | None = COUNTS,
-    settle: float = 0.0,
-    momentum: ArrayLike | None = None,
-    model: Robot | None = None,
-    substeps: int = 4,
-) -> Tracking:
-    """Run a joint motion under control, in free fall.
-
-    Differentiable in the robot, the trajectory's coefficients, motors, gains and momentum. The derivative of an
-    encoder's count is taken as that of what it counts.
-
-    Args:
-        robot: the robot.
-        trajectory: the planned motion of its joints; its duration must be known, not traced.
-        motors: motors of the joints; the robot's rotor inertias and gear ratios hold.
-        gains: of the PID controllers.
-        feedforward: add the torques that the planned motion takes from the motors.
-        sample_time: time between samples of the controller [s].
-        counts: counts of the encoders to a turn of the motor; None for perfect ones.
-        settle: time to go on after the planned motion's end [s].
-        momentum: (3,) total angular momentum, inertial frame [kg m^2/s]; default zero.
-        model: the robot that the controller believes in, for the precomputed torques; default the robot itself.
-        substeps: Runge-Kutta steps to a sample, static.
-
-    Raises:
-        ValueError: if anything does not fit the robot, a time is not positive, or a gain is negative or not finite, or
-            if the joints run away until no number comes out.
-    """
-    _check(robot, trajectory, sample_time=sample_time, counts=counts, settle=settle, substeps=substeps)
-    believed = robot if model is None else model
-    if not isinstance(believed, Robot) or believed.joints != robot.joints:
-        raise ValueError(f"`model` is {checks.shorten(believed)}; it must be a Robot of {robot.joints} joints.")
-    motors = check_motors(motors, robot)
-    gains = _gains(gains, robot)
-    start = as_numbers("momentum", np.zeros(3) if momentum is None else momentum)
-    if start.shape != (3,) or (is_concrete(start) and not np.isfinite(start).all()):
-        raise ValueError(f"`momentum` is {checks.shorten(momentum)}; it must be 3 finite numbers.")
-    turn = 0.0 if counts is None else 2 * np.pi / counts
-    count = np.ceil((float(np.asarray(trajectory.breaks)[-1]) + settle) / sample_time - 1e-9)
-    if not count <= _MOST_SAMPLES:
-        raise ValueError(
-            f"`sample_time` of {sample_time:g} s makes {count:.3g} samples; at most {_MOST_SAMPLES} are run."
-        )
-    given = (
-        without_names(robot),
-        without_names(believed),
-        trajectory,
-        motors,
-        gains,
-        start,
-        sample_time,
-        turn,
-        feedforward,
-    )
-    if not is_concrete(given):
-        return _track(*given, int(count), int(substeps))
-    with jax.debug_nans(False):  # told below
-        found = _track(*given, int(count), int(substeps))
-    lost = ~np.isfinite(found.theta).all(axis=1) | ~np.isfinite(found.rotation).all(axis=(1, 2))
-    if lost.any():
-        raise ValueError(
-            f"the joints run away under this control, and after {float(found.time[int(np.argmax(lost))]):.4g} s no "
-            "number comes out: choose smaller gains, a shorter `sample_time`, or more `substeps`."
-        )
-    return found
-
-
-def _check(robot: Robot, trajectory: Trajectory, **numbers: float | None) -> None:
-    checks.instance("robot", robot, Robot, "`make_robot` makes")
-    if not isinstance(trajectory, Trajectory):
-        raise ValueError(f"`trajectory` is a {type(trajectory).__name__}; it must be a Trajectory, as `along` makes.")
-    if trajectory.joints != robot.joints:
-        raise ValueError(f"`trajectory` moves {trajectory.joints} joints; {robot.name!r} has {robot.joints}.")
-    if not is_concrete(trajectory.breaks):
-        raise ValueError("`trajectory` has traced durations; the number of samples must be known.")
-    for entry, value in numbers.items():
-        if value is None and entry == "counts":  # perfect encoders
-            continue
-        if entry == "substeps":
-            checks.whole(entry, value)
-        elif entry == "settle":
-            checks.number(entry, value, unit="s", least=0.0)
-        else:
-            checks.positive(entry, value, unit="s" if entry == "sample_time" else "")
-
-
-def _gains(gains: Gains, robot: Robot) -> Gains:
+def check_gains(gains: Gains, robot: Robot) -> Gains:
+    """Return gains (j,) each, checked."""
     if not isinstance(gains, Gains):
         raise ValueError(f"`gains` is a {type(gains).__name__}; it must be Gains.")
     columns = []
@@ -214,105 +78,3 @@ def _gains(gains: Gains, robot: Robot) -> Gains:
             raise ValueError(f"gains.{field} is {np.asarray(array).tolist()}; it must be zero or positive, and finite.")
         columns.append(jnp.broadcast_to(array, (robot.joints,)))
     return Gains(*columns)
-
-
-@partial(jax.jit, static_argnums=(9, 10))
-def _track(
-    robot: Robot,
-    model: Robot,
-    trajectory: Trajectory,
-    motors: Motor,
-    gains: Gains,
-    momentum: Array,
-    sample_time: float,
-    turn: float,
-    feedforward: Array | bool,
-    samples: int,
-    substeps: int,
-) -> Tracking:
-    dtype = common_float(robot, trajectory, gains, momentum)
-    robot, model, trajectory, gains, momentum = jax.tree.map(
-        lambda leaf: jnp.asarray(leaf, dtype), (robot, model, trajectory, gains, momentum)
-    )
-    motors = per_joint(motors, dtype)
-    period = jnp.asarray(sample_time, dtype)
-    time = period * jnp.arange(samples + 1, dtype=dtype)
-    plan = jax.vmap(trajectory.at)(time)
-    ahead = jax.vmap(trajectory.at)(time + period / 2)  # the command is held for a period
-    forward = jax.vmap(lambda state: drive(model, motors, state.theta_dot, joint_load(model, *state)).torque)(ahead)
-    moving = time + period / 2 < trajectory.duration
-    forward = jnp.where(moving[:, None] & feedforward, forward, 0.0)
-    ratio = robot.gear_ratio
-    size = jnp.asarray(turn, dtype) / jnp.abs(ratio)
-
-    def step(carry: tuple[Array, ...], inputs: tuple[Array, ...]) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-        theta, theta_dot, rotation, integral, last = carry
-        wanted, wanted_rate, given = inputs
-        seen = _count(theta, size)
-        error = wanted - seen
-        rate = wanted_rate - (seen - last) / period
-        summed = integral + period * error
-        pid = gains.proportional * error + gains.integral * summed + gains.derivative * rate
-        command = pid / ratio + given
-        torque = _saturate(motors, command, ratio * theta_dot)
-        saturated = torque != command
-        kept = jnp.where(saturated, integral, summed)  # no wind-up
-
-        def rates(rotation: Array, joints: tuple[Array, Array], _: None) -> tuple[Array, tuple[Array, Array]]:
-            acceleration, omega = _acceleration(robot, motors, command, *joints, rotation.T @ momentum)
-            return omega, (joints[1], acceleration)
-
-        def between(state: tuple[Array, Any], _: None) -> tuple[tuple[Array, Any], None]:
-            return runge_kutta_step(RK4, rates, period / substeps, *state), None
-
-        (turned, joints), _ = jax.lax.scan(between, (rotation, (theta, theta_dot)), length=substeps)
-        return (*joints, turned, kept, seen), (theta, theta_dot, rotation, command, torque, saturated)
-
-    start = plan.theta[0], plan.theta_dot[0], jnp.eye(3, dtype=dtype)
-    before = start[0] - period * start[1]  # what was seen one sample earlier
-    carry = (*start, jnp.zeros_like(start[0]), before)
-    _, (theta, theta_dot, rotation, command, torque, saturated) = jax.lax.scan(
-        step, carry, (plan.theta, plan.theta_dot, forward)
-    )
-    return Tracking(time, plan.theta, theta, theta_dot, rotation, command, torque, saturated)
-
-
-def _count(theta: Array, size: Array) -> Array:
-    """What encoders tell of joint angles, in counts of that `size`, all if 0; its derivative is that of the angles."""
-    count = jnp.where(size > 0, size, 1)
-    return theta + jax.lax.stop_gradient(jnp.where(size > 0, count * jnp.round(theta / count) - theta, 0))
-
-
-def _saturate(motors: Motor, command: Array, speed: Array) -> Array:
-    """Torque that the motors can give of what is asked for."""
-    k = motors.torque_constant
-    least, most = (jnp.asarray((sign * motors.supply - k * speed) * k / motors.resistance) for sign in (-1, 1))
-    return jnp.clip(command, least, most)
-
-
-def _acceleration(
-    robot: Robot, motors: Motor, command: Array, theta: Array, rate: Array, momentum: Array
-) -> tuple[Array, Array]:
-    """Joint accelerations and the base's angular velocity under motor torques, gears' losses included.
-
-    With `P` the motor's torque at the joint after friction and `S(theta_ddot)` what spins up its rotor (`Load.rotor`),
-    the joint gets `k (P - S) + S`, k the efficiency, or one over it while the joint drives the motor: what `drive` asks
-    of the motor for this acceleration is what it gives. Whether a joint drives is decided without losses first, and
-    again with those.
-    """
-    ratio = robot.gear_ratio
-    speed = ratio * rate
-    friction = motors.drag * speed + motors.friction * jnp.tanh(speed / _CREEP)
-    power = ratio * (_saturate(motors, command, speed) - friction)
-    still = joint_load(robot, theta, rate, jnp.zeros_like(theta), momentum=momentum)
-    pose = kinematics(robot, theta)
-    inertia, rotor = joint_inertia_of_pose(robot, pose), rotor_inertia_of_pose(robot, pose)
-
-    def accelerated(before: Array) -> Array:
-        driving = (power - still.rotor - rotor @ before) * rate >= 0
-        k = jnp.where(driving, motors.efficiency, 1 / jnp.asarray(motors.efficiency_back))
-        lossy = inertia - (1 - k)[:, None] * rotor
-        return solve_without_exchange(lossy, k * power - still.torque + (1 - k) * still.rotor)
-
-    ideal = solve_positive(inertia, power - still.torque)
-    return accelerated(accelerated(ideal)), still.omega

@@ -17,10 +17,9 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
-from reojax import so3
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
 from reojax._internal.linalg import solve_symmetric3
@@ -29,23 +28,23 @@ from reojax.mechanics.kinematics import kinematics
 from reojax.mechanics.momentum import momentum_matrices
 from reojax.mechanics.own_units import without_names
 from reojax.motion._resolution import (
-    MOST,
-    TURN,
     Resolution,
     error_by_halving,
     over_nodes,
     quietly,
     refine,
+    resolution_status,
     spin_bounds,
     start_count,
     target_error,
 )
 from reojax.motion.trajectory import Trajectory, polynomial
+from reojax.optimisation.status import Status
 from reojax.robot import Robot
 
-DEFAULT_STEPS = 32
-"""Steps of each piece of a trajectory at which a motion is told."""
-_ORDER = 4
+DEFAULT_SAMPLES = 32
+"""Samples of each piece of a trajectory."""
+ORDER = 4
 """Of the integration."""
 
 
@@ -74,26 +73,25 @@ class Released(NamedTuple):
     error: Float[Array, ""]
     """Estimate of how far any `rotation` may be wrong by the steps taken, not by the robot's numbers [rad]."""
 
+    @property
+    def value(self) -> Float[Array, "m 3 3"]:
+        """The orientations, under the name that all solvers' results have."""
+        return self.rotation
 
-class ReleaseSpread(NamedTuple):
-    """Net rotation after an uncertain release."""
+    @property
+    def status(self) -> Int[Array, ""]:
+        """Converged where `error` is what steps that are chosen aim at; else out of steps, or not finite."""
+        return resolution_status(self.error, self.rotation)
 
-    rotation: Float[Array, "3 3"]
-    """Net rotation after the expected release."""
-    sensitivity: Float[Array, "3 10"]
-    """Derivative of the error `log(rotation^T R)` by momentum (3), pull (3), tied (3) and drag, in that order."""
-    covariance: Float[Array, "3 3"]
-    """Covariance of that error by the linear rule [rad^2]."""
-    angle_rms: Float[Array, ""]
-    """Root mean square of its angle by the linear rule [rad]."""
-    drawn: Float[Array, "n 3"]
-    """Errors of releases drawn at random [rad]."""
-    drawn_covariance: Float[Array, "3 3"]
-    """Their mean square products, about the expected release [rad^2]."""
-    drawn_angle_rms: Float[Array, ""]
-    """Root mean square of their angles [rad]."""
-    error: Float[Array, ""]
-    """Estimate of how far `rotation`, or the end of any draw, may be wrong by the steps taken [rad]."""
+    @property
+    def converged(self) -> Bool[Array, ""]:
+        """Whether `error` is below 1e-8 rad (1e-4 in float32)."""
+        return self.status == Status.CONVERGED
+
+    @property
+    def message(self) -> str:
+        """How it ended, in words."""
+        return Status(int(self.status)).text
 
 
 def released(
@@ -101,7 +99,7 @@ def released(
     trajectory: Trajectory,
     release: Release | None = None,
     *,
-    steps: int = DEFAULT_STEPS,
+    samples: int = DEFAULT_SAMPLES,
     substeps: int | None = None,
 ) -> Released:
     """Orientation and momentum of a robot that does a joint motion after a release.
@@ -110,10 +108,10 @@ def released(
         robot: the robot.
         trajectory: its joints' motion, as `along` makes it from a path, a time law and durations.
         release: how it is let go; default perfectly.
-        steps: parts of each piece of the trajectory at whose ends the motion is told, static.
-        substeps: integration steps of each part, static; fourth order. Default as many as bring `Released.error` below
-            1e-8 rad (1e-4 in float32), by how far the robot turns, and is braked, in a step; one where numbers are
-            traced.
+        samples: samples of each piece of the trajectory, static.
+        substeps: integration steps from one sample to the next, static, of fourth order. Default as many as bring
+            `Released.error` below 1e-8 rad (1e-4 in float32), by how far the robot turns, and is braked, in a step; one
+            where numbers are traced.
 
     Raises:
         ValueError: if anything does not fit the robot, or is not finite, or if the robot spins, or the wire brakes it,
@@ -122,30 +120,31 @@ def released(
     Warns:
         UserWarning: if the orientation is uncertain by more than 1e-3 rad with all the steps that are taken unasked.
     """
-    given = _check_release(robot, trajectory, Release() if release is None else release, steps)
+    given = check_release(robot, trajectory, Release() if release is None else release)
+    samples = checks.whole("samples", samples)
 
     plain = without_names(given[0])
 
     def run(count: int) -> tuple[Released, Resolution]:
-        return _simulate_release(plain, *given[1:], int(steps), count)
+        return _simulate_release(plain, *given[1:], samples, count)
 
     if substeps is not None:
         return quietly(run, checks.whole("substeps", substeps))[0]
     if not is_concrete(given):
         return run(1)[0]
-    least, most = _turn_bounds(*given)
+    least, most = turn_bounds(*given)
     return refine(
         run,
-        first=start_count(1, 1, most / steps),
-        hopeless=least / steps,
-        steps=trajectory.pieces * int(steps),
-        order=_ORDER,
+        first=start_count(1, 1, most / samples),
+        hopeless=least / samples,
+        steps=trajectory.pieces * samples,
+        order=ORDER,
         target=target_error(given[2].dtype),
         what=f"{robot.name!r} after this release",
     )
 
 
-def _turn_bounds(robot: Robot, trajectory: Trajectory, release: Array) -> tuple[float, float]:
+def turn_bounds(robot: Robot, trajectory: Trajectory, release: Array) -> tuple[float, float]:
     """Bounds of the turn by the momentum at the start, and by the wire's braking, in the longest piece [rad]."""
     longest = float(np.diff(np.asarray(trajectory.breaks, float)).max())
     numbers = np.asarray(release, float)
@@ -153,59 +152,7 @@ def _turn_bounds(robot: Robot, trajectory: Trajectory, release: Array) -> tuple[
     return max(spin[0], drag[0]), spin[1] + drag[1]
 
 
-def release_spread(
-    robot: Robot,
-    trajectory: Trajectory,
-    deviation: Release,
-    key: jax.Array,
-    *,
-    expected: Release | None = None,
-    draws: int = 256,
-    steps: int | None = None,
-) -> ReleaseSpread:
-    """Net rotation and how far an uncertain release spreads it, by derivatives and by draws.
-
-    All numbers of the release are taken as independent and normal.
-
-    Args:
-        robot: the robot.
-        trajectory: its joints' motion.
-        deviation: standard deviations of the numbers of the release.
-        key: a key of `jax.random`, for the draws.
-        expected: the release that is aimed at; default a perfect one.
-        draws: number of draws, static.
-        steps: steps of each piece of the trajectory, static; fourth order. Default 32, or more where the robot may
-            turn, or be braked, by more than 0.1 rad in one (by three standard deviations).
-
-    Raises:
-        ValueError: if anything does not fit the robot, is not finite, or a deviation is negative, or the motion is too
-            fast for the steps.
-    """
-    checks.whole("draws", draws)
-    aim = Release() if expected is None else expected
-    robot, trajectory, mean = _check_release(robot, trajectory, aim, DEFAULT_STEPS if steps is None else steps)
-    *_, spread = _check_release(robot, trajectory, deviation, 1)
-    if is_concrete(spread) and (np.asarray(spread) < 0).any():
-        raise ValueError(f"`deviation` is {checks.shorten(deviation)}; standard deviations must not be negative.")
-    if steps is None:
-        steps = DEFAULT_STEPS
-        if is_concrete((robot, trajectory, mean, spread)):
-            _, turn = _turn_bounds(robot, trajectory, jnp.abs(mean) + 3 * spread)
-            steps *= start_count(1, 1, 2 * turn / DEFAULT_STEPS)
-            if trajectory.pieces * steps > MOST // 4:
-                raise ValueError(
-                    f"after this release {robot.name!r} turns, or is braked, by up to {turn:.3g} rad in a piece of the "
-                    f"trajectory: more than {MOST // 4} steps of {TURN} rad would be taken. Give `steps` to take them."
-                )
-    found = _spread(without_names(robot), trajectory, mean, spread, key, int(draws), int(steps))
-    if is_concrete(found) and not all(np.isfinite(leaf).all() for leaf in found):
-        raise ValueError(f"after this release {robot.name!r} turns, or is braked, too fast for {steps} steps a piece.")
-    return found
-
-
-def _check_release(
-    robot: Robot, trajectory: Trajectory, release: Release, steps: int
-) -> tuple[Robot, Trajectory, Array]:
+def check_release(robot: Robot, trajectory: Trajectory, release: Release) -> tuple[Robot, Trajectory, Array]:
     """Everything as arrays of one dtype, the release as one vector of ten."""
     checks.instance("robot", robot, Robot, "`make_robot` makes")
     if not isinstance(trajectory, Trajectory):
@@ -214,7 +161,6 @@ def _check_release(
         raise ValueError(f"`trajectory` moves {trajectory.joints} joints; {robot.name!r} has {robot.joints}.")
     if not isinstance(release, Release):
         raise ValueError(f"`release` is a {type(release).__name__}; it must be a Release.")
-    checks.whole("steps", steps)
     numbers = {field: as_numbers(f"release.{field}", value) for field, value in release._asdict().items()}
     for field, value in numbers.items():
         shape = () if field == "drag" else (3,)
@@ -241,17 +187,17 @@ class _Node(NamedTuple):
 
 @partial(jax.jit, static_argnums=(3, 4))
 def _simulate_release(
-    robot: Robot, trajectory: Trajectory, release: Array, steps: int, substeps: int
+    robot: Robot, trajectory: Trajectory, release: Array, samples: int, substeps: int
 ) -> tuple[Released, Resolution]:
-    if steps * substeps % 2:  # the error is found by half the steps
+    if samples * substeps % 2:  # the error is found by half the steps
         substeps *= 2
-    time, length, nodes = _nodes(robot, trajectory, steps * substeps)
+    time, length, nodes = nodes_of(robot, trajectory, samples * substeps)
     count = len(length)
     double = jax.tree.map(lambda x: _half(jnp.stack([x[::2, 0], x[::2, 2], x[1::2, 2]], axis=1)), nodes)
     both = jax.tree.map(lambda *pair: jnp.stack(pair), nodes, double)
-    integrate = jax.vmap(_integrate, (0, 0, None))  # one loop, compiled once
+    integrate = jax.vmap(integrate_release, (0, 0, None))  # one loop, compiled once
     (fine, coarse), (momentum, _) = integrate(jnp.stack([length, _half(2 * length[::2])]), both, release)
-    error = error_by_halving(fine, coarse[: count // 2 + 1], _ORDER)
+    error = error_by_halving(fine, coarse[: count // 2 + 1], ORDER)
     size, mobility = jnp.sqrt((momentum[:-1] ** 2).sum(-1)), jnp.sqrt((nodes.mobility**2).sum((-1, -2)).max(1))
     rate = jnp.sqrt((nodes.own**2).sum(-1).max(1)) + mobility * (jnp.where(jnp.isfinite(size), size, 0) + release[9])
     resolution = Resolution(error, jax.lax.stop_gradient((length * rate).max()))
@@ -263,46 +209,7 @@ def _half(values: Array) -> Array:
     return jnp.concatenate([values, jnp.zeros_like(values)])
 
 
-@partial(jax.jit, static_argnums=(5, 6))
-def _spread(
-    robot: Robot, trajectory: Trajectory, mean: Array, deviation: Array, key: jax.Array, draws: int, steps: int
-) -> ReleaseSpread:
-    steps *= 1 + steps % 2  # the error is found by half the steps
-    _, length, nodes = _nodes(robot, trajectory, steps)
-    double = jax.tree.map(lambda x: jnp.stack([x[::2, 0], x[::2, 2], x[1::2, 2]], axis=1), nodes)
-
-    def end(release: Array) -> Array:
-        return _integrate(length, nodes, release)[0][-1]
-
-    def rough_end(release: Array) -> Array:
-        return _integrate(2 * length[::2], double, release)[0][-1]
-
-    # one program for everything: the expected release by each of its numbers, and the draws by none
-    random = deviation[None] * jax.random.normal(key, (draws, mean.size), mean.dtype)
-    along = jnp.concatenate([jnp.eye(mean.size, dtype=mean.dtype), jnp.zeros_like(random)])
-    start = mean[None] + jnp.concatenate([jnp.zeros((mean.size, mean.size), mean.dtype), random])
-    ends, slopes = jax.vmap(lambda release, by: jax.jvp(end, (release,), (by,)))(start, along)
-    places = np.array([0, *range(mean.size, len(start))])
-    error = error_by_halving(jnp.repeat(ends[places], 2, axis=0)[:-1], jax.vmap(rough_end)(start[places]), _ORDER)
-    rotation = ends[0]
-    back = partial(jnp.matmul, rotation.T, precision="highest")
-    sensitivity = jax.vmap(lambda slope: so3.vee(back(slope)))(slopes[: mean.size]).T
-    scaled = sensitivity * deviation[None]
-    covariance = jnp.matmul(scaled, scaled.T, precision="highest")
-    drawn = jax.vmap(lambda turned: so3.log(back(turned)))(ends[mean.size :])
-    return ReleaseSpread(
-        rotation=rotation,
-        sensitivity=sensitivity,
-        covariance=covariance,
-        angle_rms=jnp.sqrt(jnp.trace(covariance)),
-        drawn=drawn,
-        drawn_covariance=jnp.matmul(drawn.T, drawn, precision="highest") / draws,
-        drawn_angle_rms=jnp.sqrt((drawn**2).sum(axis=1).mean()),
-        error=error,
-    )
-
-
-def _nodes(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Array, _Node]:
+def nodes_of(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Array, _Node]:
     """Times, lengths of all steps, and what counts at the start, the middle and the end of each."""
     dtype = trajectory.breaks.dtype
     piece = jnp.diff(trajectory.breaks)
@@ -311,6 +218,7 @@ def _nodes(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Arr
     state = jax.vmap(jax.vmap(jax.vmap(polynomial, (None, 0)), (None, 0)))(trajectory.coefficients, within)
 
     def node(theta: Array, theta_dot: Array) -> _Node:
+        # A^-1 [B theta_dot, 1]
         A, B = momentum_matrices(robot, theta)
         columns = jnp.concatenate([(B @ theta_dot)[:, None], jnp.eye(3, dtype=dtype)], axis=1)
         both = solve_symmetric3(A, columns)
@@ -323,11 +231,12 @@ def _nodes(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Arr
     return time, length, jax.tree.map(lambda leaf: leaf.reshape(count, 3, *leaf.shape[1:]), nodes)
 
 
-def _integrate(length: Array, nodes: _Node, release: Array) -> tuple[Array, Array]:
+def integrate_release(length: Array, nodes: _Node, release: Array) -> tuple[Array, Array]:
     """Rotations (m, 3, 3) and momenta (m, 3): Runge-Kutta of order four on the rotation vector of each step."""
     momentum, pull, tied, drag = release[:3], release[3:6], release[6:9], release[9]
 
     def rates(rotation: Array, momentum: Array, node: _Node) -> tuple[Array, Array]:
+        # omega = A^-1 (B theta_dot + R^T H);  H' = (R r) x F - c R omega
         omega = node.own + node.mobility @ (rotation.T @ momentum)
         return omega, jnp.cross(rotation @ (tied - node.middle), pull) - drag * (rotation @ omega)
 

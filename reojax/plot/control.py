@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from reojax._internal.arrays import Array
 from reojax.drawing.colours import ANGLES, INK, JOINTS
 from reojax.mechanics.attitude import tilt_and_roll
-from reojax.motion.pid import Tracking
+from reojax.motion.closed_loop import Tracking
 from reojax.plot._style import dress, legend_above
 from reojax.robot import Robot
 

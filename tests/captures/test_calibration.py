@@ -84,13 +84,13 @@ def test_noise_of_the_joints_does_not_shift_the_clocks(synthetic):
 
 def test_the_derivatives_are_those_of_the_residuals(synthetic, exact):
     """Gauss-Newton's derivatives against differences, and the pull of the joints' noise against a push."""
-    from reojax.captures.calibration import _Problem
+    from reojax.captures.fit import FitProblem
     from reojax.captures.parameters import resolve
 
     capture, _ = exact
     robot = robots.prototype()
     fitted = resolve(robot, PAIR)
-    problem = _Problem(robot, capture, fitted, True)
+    problem = FitProblem(robot, capture, fitted, True)
     x = np.array([synthetic.END_INERTIA, synthetic.ROTOR_INERTIA])
     state = problem.fit_window(x)
     for k in range(2):
@@ -101,7 +101,7 @@ def test_the_derivatives_are_those_of_the_residuals(synthetic, exact):
     ends = [problem._state(x, state.frame, state.offset + sign * 1e-5).residual for sign in (1, -1)]
     np.testing.assert_allclose(state.derivative[:, :, 5], (ends[0] - ends[1]) / 2e-5, atol=0.3)
     jacobian = state.derivative.reshape(-1, 6)
-    pull = problem._pull(state).reshape(6, -1, 3)
+    pull = problem.push(state).reshape(6, -1, 3)
     for frame, joint in ((60, 1), (90, 0), (120, 2)):
         pushed = []
         for sign in (1, -1):

@@ -9,8 +9,9 @@ import reojax
 from reojax import Gains, robots, so3
 from reojax.captures import comparison
 from reojax.mechanics.dynamics import joint_load
+from reojax.motion.closed_loop import _acceleration, track
 from reojax.motion.motor import check_motors, drive, per_joint
-from reojax.motion.pid import _acceleration, gains, track
+from reojax.motion.pid import gains
 
 ROBOT = robots.prototype()
 PATH = reojax.manoeuvre_a(np.deg2rad(90), np.deg2rad(60))
@@ -53,7 +54,7 @@ def test_a_spin_goes_on_while_the_joints_move():
     square = (3 * (end - start) - h * (2 * rate + last)) / h**2
     cube = (2 * (start - end) + h * (rate + last)) / h**3
     joints = reojax.Trajectory(tracking.time, np.stack([start, rate, square, cube], axis=1))
-    expected = reojax.released(ROBOT, joints, reojax.Release(spin), steps=1)
+    expected = reojax.released(ROBOT, joints, reojax.Release(spin), samples=1)
     np.testing.assert_allclose(tracking.rotation, expected.rotation, atol=1e-4)
     still = comparison.joints_simulated(ROBOT, reojax.make_capture(tracking.time, tracking.theta)).rotation
     assert so3.angle(still[-1].T @ tracking.rotation[-1]) > 0.1
