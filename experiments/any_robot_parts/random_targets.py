@@ -17,7 +17,8 @@ _FINER = 16
 
 def random_targets(quick: bool) -> dict[str, Any]:
     """A row for each robot: how many of 200 are reached, with how many runs and how much travel, and seconds."""
-    rows = [_row(name, make(), 1 if quick else 200) for name, make in ROBOTS.items()]
+    chosen = list(ROBOTS.items())[: 1 if quick else None]
+    rows = [_row(name, make(), 1 if quick else 200) for name, make in chosen]
     return {"rows": rows, "converged": all(row["reached"] == row["targets"] for row in rows)}
 
 

@@ -5,7 +5,7 @@ import warnings
 from typing import Any
 
 import numpy as np
-from common.replay import pinocchio
+from common.replay import pinocchio, replay
 from scipy.spatial.transform import Rotation
 
 import reojax
@@ -48,9 +48,8 @@ def _row(name: str, package: str, file: str) -> dict[str, Any]:
         path = reojax.free_path(robot, target, start=start, repeats="least")
         seconds.append(time.process_time() - begun)
         assert ((path.waypoints >= robot.lower - 1e-9) & (path.waypoints <= robot.upper + 1e-9)).all()
-        found.append((path, _left(robot, path, target)))
-    paths = [path for path, _ in found]
-    errors = [error for _, error in found if error is not None]
+        found.append((path, *_left(robot, path, target)))
+    paths, errors, oracles = zip(*found, strict=True)
     row = {
         "robot": name,
         "joints": robot.joints,
@@ -58,7 +57,7 @@ def _row(name: str, package: str, file: str) -> dict[str, Any]:
         "runs x, y, z": ", ".join(str(path.repeats) for path in paths),
         "travel x, y, z [deg]": ", ".join(f"{np.rad2deg(path.travel):.0f}" for path in paths),
         "largest error [rad]": f"{max(path.error for path in paths):.1e}",
-        "by Pinocchio [rad]": f"{max(errors):.1e}" if errors else "refused",
+        "replayed [rad]": f"{max(errors):.1e}, {oracles[0]}",
         "first [CPU s]": round(seconds[0], 1),
         "next two [CPU s]": f"{seconds[1]:.1f}, {seconds[2]:.1f}",
     }
@@ -66,10 +65,10 @@ def _row(name: str, package: str, file: str) -> dict[str, Any]:
     return row
 
 
-def _left(robot: reojax.Robot, path: reojax.FreePaths, target: np.ndarray) -> float | None:
-    """Angle to the target after a replay by Pinocchio [rad]; None where it refuses a link lighter than its rotor."""
+def _left(robot: reojax.Robot, path: reojax.FreePaths, target: np.ndarray) -> tuple[float, str]:
+    """Angle to the target after a replay [rad], and by what; Pinocchio refuses links that are lighter than a rotor."""
     try:
-        once = pinocchio(robot, path.waypoints)
+        once, oracle = pinocchio(robot, path.waypoints), "Pinocchio"
     except RuntimeError:
-        return None
-    return Rotation.from_matrix(np.linalg.matrix_power(once, int(path.repeats)).T @ target).magnitude()
+        once, oracle = replay(robot, path.waypoints[None])[0], "momentum summed link by link"
+    return Rotation.from_matrix(np.linalg.matrix_power(once, int(path.repeats)).T @ target).magnitude(), oracle
