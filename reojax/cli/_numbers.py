@@ -103,7 +103,7 @@ def in_degrees(text: str) -> str:
     def told(found: re.Match) -> str:
         if found[3] is None:
             return found[0]
-        first = "" if found[1] is None else f"{math.degrees(float(found[1])):.6g}{found[2]}"
-        return f"{first}{math.degrees(float(found[3])):.6g} degrees"
+        first = "" if found[1] is None else f"{math.degrees(float(found[1])):.5g}{found[2]}"
+        return f"{first}{math.degrees(float(found[3])):.5g} degrees"
 
     return re.sub(r"\bin rad\b", "in degrees", _RADIANS.sub(told, _ASKED.sub("", text)))

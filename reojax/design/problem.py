@@ -131,14 +131,14 @@ class Problem:
         for entry, function in (("build", build), ("objective", objective)):
             if not callable(function):
                 raise ValueError(f"`{entry}` is {checks.shorten(function)}; it must be a function.")
-        for entry, listed, kind in (
-            ("variables", variables, Variable | Loops),
-            ("equality", equality, Callable),
-            ("inequality", inequality, Callable),
-        ):
-            if not isinstance(listed, Sequence) or not all(isinstance(item, kind) for item in listed):
-                what = "measures, which are functions" if kind is Callable else "Variables and families of loops"
-                raise ValueError(f"`{entry}` is {checks.shorten(listed)}; it must list {what}.")
+        families = isinstance(variables, Sequence) and all(isinstance(item, Variable | Loops) for item in variables)
+        if not families:
+            raise ValueError(
+                f"`variables` is {checks.shorten(variables)}; it must list Variables and families of loops."
+            )
+        for entry, listed in (("equality", equality), ("inequality", inequality)):
+            if not isinstance(listed, Sequence) or not all(callable(item) for item in listed):
+                raise ValueError(f"`{entry}` is {checks.shorten(listed)}; it must list measures, which are functions.")
         checks.whole("steps", steps)
         self.loops = tuple(v for v in variables if isinstance(v, Loops))
         self.space = Space([v.variable if isinstance(v, Loops) else v for v in variables])

@@ -56,7 +56,7 @@ class Candidates(NamedTuple):
     square: np.ndarray
     """(m,) squared residual [rad^2]."""
 
-    def take(self, keep: np.ndarray) -> "Candidates":
+    def take(self, keep: np.ndarray | slice) -> "Candidates":
         """Some of the rows."""
         return Candidates(*(field[..., keep] for field in self))
 

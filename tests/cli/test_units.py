@@ -14,7 +14,7 @@ from reojax.cli._numbers import in_degrees
         ("is limited to -1.5708..1.5708 rad; it", "is limited to -90..90 degrees; it"),
         ("it must be one positive number, in rad.", "it must be one positive number, in degrees."),
         ("is 296.706 rad, more than two turns; is it in degrees?", "is 17000 degrees, more than two turns"),
-        ("lower[0] is 1e-2 rad: are these degrees?", "lower[0] is 0.572958 degrees"),
+        ("lower[0] is 1e-2 rad: are these degrees?", "lower[0] is 0.57296 degrees"),
         ("a body rate of 3.2 rad/s, 2 kg", "a body rate of 3.2 rad/s, 2 kg"),
         ("the file 'v1.5 radius.csv' of 3 rads", "the file 'v1.5 radius.csv' of 3 rads"),
         ("up to inf rad", "up to inf degrees"),
