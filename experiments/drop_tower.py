@@ -55,7 +55,7 @@ def the_plan() -> dict[str, Any]:
     """Net rotations of A and B at 270/120."""
     robot, rows, result = robots.prototype(), [], {}
     for name, plan in tracking_part.plans().items():
-        turns = np.asarray(reojax.released(robot, plan, steps=64).rotation)
+        turns = np.asarray(reojax.released(robot, plan, samples=64).rotation)
         roll = float(tilt_and_roll(turns)[-1, 2])
         vector = np.asarray(reojax.so3.log(turns[-1]))
         said = {"A": "+3.35 (measured)", "B": "mainly yaw"}[name]

@@ -53,7 +53,7 @@ def main(out: Path, *, quick: bool = False) -> dict:
     rows, spreads = {}, {}
     for name, found in (("least travel", least), ("least spread", steady)):
         path = loop.path(plain.space.named(found.value[found.best])["loop"])
-        spreads[name] = design.spread(robot, path, TOLERANCES, samples=200 if quick else 2000, steps=4)
+        spreads[name] = design.spread(robot, path, TOLERANCES, draws=200 if quick else 2000, steps=4)
         rows[name] = _figures(robot, path, found, spreads[name])
     print("\n180 deg of roll, 5 % errors of all inertias\n")
     keys = [key for key, value in rows["least travel"].items() if not isinstance(value, list | dict)]

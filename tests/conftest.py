@@ -15,6 +15,8 @@ shapes.install()
 
 from reojax.session import compile_quickly  # noqa: E402
 
+MOST_BYTES = 2e9
+"""Memory of a process from which on compiled programs are let go."""
 X64 = os.environ.get("REOJAX_TEST_X64", "1") != "0"
 
 compile_quickly()
@@ -29,7 +31,7 @@ def pytest_configure(config: pytest.Config) -> None:
         return
     folder = Path(config.cache.mkdir("jax"))  # pyright: ignore[reportOptionalMemberAccess]
     jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -43,6 +45,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(autouse=True, scope="module")
 def _forget_programs() -> Iterator[None]:
-    """Compiled programs take gigabytes by the end; few of them serve two files."""
+    """Compiled programs take gigabytes by the end: they are let go before that, and not after every file."""
     yield
-    jax.clear_caches()
+    if _resident() > MOST_BYTES:
+        jax.clear_caches()
+
+
+def _resident() -> float:
+    """Memory of this process [bytes]; infinite where nothing tells it."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, AttributeError, ValueError):
+        return float("inf")

@@ -72,7 +72,7 @@ ENTRIES: dict[str, Callable[[Robot], Any]] = {
     "free_path": lambda robot: reojax.free_path(robot, TARGET, lower=-1.5, upper=1.5),
     "plan with clearance": clear_plan,
 }
-QUICK = {"net_rotation", "clearance", "simulate", "released", "minimum_time", "plan", "momentum_matrices"}
+QUICK = {"net_rotation", "clearance", "simulate", "minimum_time", "plan"}
 
 
 def compiled(work: Callable[[], Any]) -> int:

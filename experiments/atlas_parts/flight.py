@@ -71,7 +71,7 @@ def flight(subject: Subject, name: str, turn: Row, releases: int) -> Row:
         "duration_s": float(durations.sum()),
         "releases": releases,
         "inertias_alone_deg": np.rad2deg(
-            design.spread(robot, path, {"inertia": INERTIA}, samples=2, steps=16).deviation
+            design.spread(robot, path, {"inertia": INERTIA}, draws=2, steps=16).deviation
         ).tolist(),
     }
     for way, steered in (("open loop", 0.0), ("Steering", 1.0)):

@@ -20,7 +20,7 @@ def section(out: Path, *, quick: bool) -> dict[str, Any]:
     capture = reojax.read_capture(SHIPPED, robot)
     path = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
     plan = reojax.along(path, "quintic", np.array(synthetic_capture.DURATIONS))
-    ideal = reojax.released(robot, plan, steps=64)
+    ideal = reojax.released(robot, plan, samples=64)
     theta = jax.vmap(plan.at)(ideal.time).theta
     planned = reojax.compare(robot, capture, Sampled(*map(np.asarray, (ideal.time, theta, ideal.rotation))))
     own = reojax.compare(robot, capture)

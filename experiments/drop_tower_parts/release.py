@@ -38,8 +38,8 @@ def section(*, quick: bool, durations: Sequence[float] = DURATIONS) -> dict[str,
     ends = []
     for factor in (1.0, 2.0):
         slower = plans([factor * x for x in durations])["A"]
-        ends.append(reojax.released(robot, slower, spin, steps=64).rotation[-1])
-    perfect = reojax.released(robot, plan, steps=64).rotation[-1]
+        ends.append(reojax.released(robot, slower, spin, samples=64).rotation[-1])
+    perfect = reojax.released(robot, plan, samples=64).rotation[-1]
     off = [float(np.rad2deg(so3.angle(perfect.T @ end))) for end in ends]
     result["spinning_deg"] = off
     text = f"{off[0]:.1f}, {off[1]:.1f}"

@@ -33,6 +33,7 @@ from reojax.captures.capture import Capture
 from reojax.captures.orientation import chain, edge_turn, fill_gaps, fill_up, steps_needed
 from reojax.captures.parameters import Parameter, Put, resolve
 from reojax.mechanics.own_units import without_names
+from reojax.optimisation.status import Status
 from reojax.robot import Robot
 
 SINGULAR = 1e-6
@@ -75,7 +76,41 @@ class Calibration(NamedTuple):
     warning: str
     """What the capture does not tell, in words; empty if all is well."""
     converged: bool
+    """Whether the fit came to rest before it was out of steps."""
     steps: int
+    """Evaluations of the residuals that it took."""
+
+    @property
+    def value(self) -> Float[np.ndarray, " p"]:
+        """The fitted values, under the name that all solvers' results have."""
+        return self.values
+
+    @property
+    def cost(self) -> float:
+        """The RMS angle that is left [rad]."""
+        return self.rms
+
+    @property
+    def error(self) -> Float[np.ndarray, " p"]:
+        """The standard deviations."""
+        return self.std
+
+    @property
+    def violation(self) -> float:
+        """How far a value is below 0 that must be positive: 0, as none ever is."""
+        return 0.0
+
+    @property
+    def status(self) -> Status:
+        """Converged, out of steps, or not finite; what the capture does not tell is in `warning`."""
+        if not np.isfinite(self.rms):
+            return Status.NOT_FINITE
+        return Status.CONVERGED if self.converged else Status.OUT_OF_STEPS
+
+    @property
+    def message(self) -> str:
+        """How it ended, and what the capture does not tell, in words."""
+        return f"{self.status.text}; {self.warning}" if self.warning else self.status.text
 
 
 @in_double

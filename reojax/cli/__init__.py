@@ -13,8 +13,9 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
+from reojax._internal.version import version
 from reojax.cli import compare, export, merge, plan, show, simulate, sweep, time, view
-from reojax.cli._arguments import BadInput, Parser, in_degrees, join_negative_values, version
+from reojax.cli._arguments import BadInput, Parser, in_degrees, join_negative_values
 
 COMMANDS = {
     "simulate": simulate,

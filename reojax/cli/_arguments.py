@@ -8,14 +8,6 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-LARGEST_ANGLE = 36000.0
-"""Largest amplitude at the command line [deg]: a hundred turns."""
-SHORTEST = 1e-4
-"""Shortest duration at the command line [s]; a power of a shorter one may not be a number."""
-LONGEST = 1e4
-"""Longest duration at the command line [s]."""
-
-
 OPTIONS: dict[str, None] = {}
 """Options of all subcommands."""
 
@@ -45,19 +37,6 @@ class Parser(argparse.ArgumentParser):
         (file or sys.stderr).write(message)
 
 
-def degrees(text: str) -> float:
-    """Read an angle in degrees (an argparse type)."""
-    try:
-        angle = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
-    if not math.isfinite(angle):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
-    if abs(angle) > LARGEST_ANGLE:
-        raise argparse.ArgumentTypeError(f"{text!r} is beyond {LARGEST_ANGLE:g} degrees")
-    return angle
-
-
 def join_negative_values(arguments: Sequence[str]) -> list[str]:
     """Make argparse see all negative numbers: `--bend=-1e2`; further ones of an option begin with a space."""
     result: list[str] = []
@@ -83,16 +62,6 @@ def in_degrees(text: str) -> str:
 
     asked = re.sub(r"[;:] (is it in|are these) degrees\?", "", text)
     return re.sub(r"\bin rad\b", "in degrees", angles.sub(turned, asked))
-
-
-def version() -> str:
-    """Version of the installed package."""
-    from importlib import metadata
-
-    try:
-        return metadata.version("reojax")
-    except metadata.PackageNotFoundError:
-        return "(not installed)"
 
 
 def _negative(text: str) -> bool:

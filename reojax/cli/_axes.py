@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from reojax._internal.display_units import display_unit
-from reojax.cli._arguments import LARGEST_ANGLE
+from reojax.cli._numbers import LARGEST_ANGLE, number
 
 if TYPE_CHECKING:
     import numpy as np
@@ -86,13 +86,13 @@ def check_names(axes: Sequence[Axis]) -> None:
 
 
 def _number(name: str, text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"axis {name!r}: {text!r} is not a number") from None
     unit, least, most = AXES[name]
-    if not least <= number <= most:  # nor is NaN between them
+    try:
+        value = number(text)
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"axis {name!r}: {error}") from None
+    if not least <= value <= most:
         raise argparse.ArgumentTypeError(
             f"axis {name!r}: {text!r} is not between {least:g} and {most:g} {display_unit(unit)[0]}".rstrip()
         )
-    return number
+    return value

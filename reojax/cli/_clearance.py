@@ -1,30 +1,13 @@
 """What the subcommands share about staying clear of itself: lengths with units, the check of a path, how it is told."""
 
 import argparse
-import math
 from typing import TYPE_CHECKING, Any
+
+from reojax.cli._numbers import length
 
 if TYPE_CHECKING:
     from reojax.path import Path
     from reojax.robot import Robot
-
-_UNITS = {"mm": 1e-3, "cm": 1e-2, "um": 1e-6, "m": 1.0}
-"""Longer names first, as the last one ends them all."""
-
-
-def length(text: str) -> float:
-    """Read a length with its unit, from 0 up, in metres (an argparse type): 5mm, 0.5 cm, 0.005m."""
-    for unit, size in _UNITS.items():
-        number = text.strip().removesuffix(unit)
-        if number != text.strip():
-            try:
-                value = float(number) * size
-            except ValueError:
-                break
-            if math.isfinite(value) and value >= 0:
-                return value
-            break
-    raise argparse.ArgumentTypeError(f"{text!r} is not a length from 0 up with its unit, such as 5mm or 0.005m")
 
 
 def add_clearance(parser: argparse.ArgumentParser, what: str) -> None:

@@ -3,7 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from reojax.cli._arguments import degrees
+from reojax.cli._numbers import degrees
 from reojax.cli._plan_file import add_plan_file, saved_plan
 from reojax.cli._robot import add_robot, layout_of, robot_of
 

@@ -1,10 +1,9 @@
 """What the subcommands that drive the joints share: the motors' supply and numbers that must be positive."""
 
 import argparse
-import math
 from typing import TYPE_CHECKING
 
-from reojax.cli._arguments import LONGEST, SHORTEST
+from reojax.cli._numbers import VOLTAGE, number, number_from
 
 if TYPE_CHECKING:
     from reojax.motion.motor import Motor
@@ -27,21 +26,16 @@ def add_motors(parser: argparse.ArgumentParser, *, law: str | None) -> None:
 
 def volts(text: str) -> float:
     """Read a supply voltage (an argparse type)."""
-    return in_range(text, "a supply voltage", WEAKEST, 1e4)
-
-
-def seconds(text: str) -> float:
-    """Read a duration (an argparse type)."""
-    return in_range(text, "a duration in seconds", SHORTEST, LONGEST)
+    return number_from(text, "a supply voltage", WEAKEST, 1e4, VOLTAGE)
 
 
 def momentum(text: str) -> list[float]:
     """Read an angular momentum, three numbers between commas (an argparse type)."""
     try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
+        numbers = [number(part) for part in text.split(",")]
+    except argparse.ArgumentTypeError:
         numbers = []
-    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+    if len(numbers) != 3:
         raise argparse.ArgumentTypeError(f"{text!r} is not three finite numbers X,Y,Z")
     return numbers
 
@@ -58,14 +52,4 @@ def motor_of(robot: "Robot", args: argparse.Namespace) -> "Motor":
 
 
 def _winding(text: str) -> float:
-    return in_range(text, "a number of a winding", 1e-6, 1e6)
-
-
-def in_range(text: str, what: str, least: float, most: float) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
-    if not least <= number <= most:
-        raise argparse.ArgumentTypeError(f"{text!r} is not {what}: it must be from {least:g} to {most:g}")
-    return number
+    return number_from(text, "a number of a winding", 1e-6, 1e6)

@@ -3,7 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING
 
-from reojax.cli._arguments import LONGEST, SHORTEST
+from reojax.cli._numbers import seconds as read_seconds
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,12 +56,4 @@ def plan_motion(path: "Path", args: argparse.Namespace) -> "Trajectory":
 
 
 def _durations(text: str) -> list[float]:
-    try:
-        seconds = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number, or several with commas between") from None
-    if not all(SHORTEST <= value <= LONGEST for value in seconds):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a duration in seconds: it must be from {SHORTEST:g} to {LONGEST:g}"
-        )
-    return seconds
+    return [read_seconds(part) for part in text.split(",")]

@@ -5,9 +5,11 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-from reojax.cli._arguments import BadInput, version
+from reojax._internal.version import version
+from reojax.cli._arguments import BadInput
 from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_amplitudes, path_of
+from reojax.cli._numbers import TIME, number
 from reojax.cli._page import add_page, check_page, write_page
 from reojax.cli._planned import add_timing, plan_motion
 from reojax.cli._robot import add_robot, robot_of
@@ -28,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_amplitudes(parser, default=None)
     add_timing(parser)
     add("--angles", choices=("deg", "rad"), help="unit of angles whose header does not say it")
-    add("--offset", type=float, metavar="S", help="time of the capture at which the motion starts [fitted]")
+    add("--offset", type=_offset, metavar="S", help="time of the capture at which the motion starts [fitted]")
     fitted = "fit these numbers of the robot to the capture first, such as end_inertia,rotor_inertia or com[0,2]"
     add("--calibrate", metavar="NAMES", help=fitted)
     add("--json", action="store_true", help="print one JSON object, with all digits")
@@ -131,7 +133,7 @@ def _motion(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple["Sa
     from reojax.motion.release import released
 
     trajectory = plan_motion(path, args)
-    motion = released(robot, trajectory, steps=64)
+    motion = released(robot, trajectory, samples=64)
     theta = jax.vmap(trajectory.at)(motion.time).theta
     name = f"manoeuvre {args.manoeuvre.upper()}, twist {args.twist:g} deg, bend {args.bend:g} deg, {args.law}"
     return Sampled(*(np.asarray(x, float) for x in (motion.time, theta, motion.rotation))), name
@@ -222,3 +224,7 @@ def _fit_text(fit: dict[str, Any]) -> list[str]:
     if fit["warning"]:
         lines.append(f"  careful: {fit['warning']}")
     return lines
+
+
+def _offset(text: str) -> float:
+    return number(text, TIME)

@@ -2,14 +2,15 @@
 
 import argparse
 import json
-import math
 import sys
 from typing import TYPE_CHECKING, Any
 
-from reojax.cli._arguments import BadInput, version
+from reojax._internal.version import version
+from reojax.cli._arguments import BadInput
 from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
 from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_manoeuvre, robot_and_path
+from reojax.cli._numbers import RATE, TIME, from_zero
 from reojax.cli._planned import add_timing, plan_motion
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("file", metavar="FILE", help="to write: .csv, or .yaml, .yml or .json for ROS 2")
     add_manoeuvre(parser)
     add_timing(parser)
-    add("--rate", type=_positive, default=200.0, metavar="HZ", help="points per second, about [%(default)g]")
+    add("--rate", type=_rate, default=200.0, metavar="HZ", help="points per second, about [%(default)g]")
     add("--delay", type=_delay, default=0.0, metavar="S", help="time before the first point [%(default)g]")
     add_clearance(parser, "proven along the whole path, or nothing is written and exit 1")
     add("--torques", action="store_true", help="write the joint torques in free fall too")
@@ -87,18 +88,12 @@ def _write(robot: "Robot", path: "Path", args: argparse.Namespace) -> dict[str, 
     }
 
 
-def _positive(text: str) -> float:
-    number = _delay(text)
-    if not number:
+def _rate(text: str) -> float:
+    value = from_zero(text, RATE)
+    if not value:
         raise argparse.ArgumentTypeError(f"{text!r} must be positive")
-    return number
+    return value
 
 
 def _delay(text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
-    if not (math.isfinite(number) and number >= 0):
-        raise argparse.ArgumentTypeError(f"{text!r} must be finite and not negative")
-    return number
+    return from_zero(text, TIME)

@@ -4,9 +4,11 @@ import argparse
 import json
 from typing import TYPE_CHECKING, Any
 
-from reojax.cli._arguments import BadInput, degrees, version
+from reojax._internal.version import version
+from reojax.cli._arguments import BadInput
 from reojax.cli._clearance import add_clearance
 from reojax.cli._free import add_free, asked, free
+from reojax.cli._numbers import degrees, whole
 from reojax.cli._page import add_page, check_page, write_page
 from reojax.cli._robot import add_robot, robot_of
 
@@ -32,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_robot(parser)
     add("--twist-limit", type=degrees, metavar="DEG", help="of the distal joints [270]")
     add("--bend-limit", type=degrees, metavar="DEG", help="of the centre joint [120]")
-    add("--max-manoeuvres", type=int, default=5, metavar="N", help="manoeuvres allowed [%(default)d]")
+    add("--max-manoeuvres", type=whole, default=5, metavar="N", help="manoeuvres allowed [%(default)d]")
     parts = "count: fewest manoeuvres; travel: least joint travel [%(default)s]"
     add("--objective", choices=("count", "travel"), default="count", help=parts)
     words = "manoeuvres: A and B; rectangles: each distal joint its own amplitude; free: one path of little joint"

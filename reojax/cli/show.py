@@ -4,7 +4,8 @@ import argparse
 import json
 from typing import TYPE_CHECKING, Any
 
-from reojax.cli._arguments import BadInput, version
+from reojax._internal.version import version
+from reojax.cli._arguments import BadInput
 
 if TYPE_CHECKING:
     from reojax.planning.plan_file import SavedPlan

@@ -5,7 +5,8 @@ import json
 import sys
 from typing import TYPE_CHECKING, Any
 
-from reojax.cli._arguments import BadInput, version
+from reojax._internal.version import version
+from reojax.cli._arguments import BadInput
 from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
 from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path

@@ -12,6 +12,7 @@ from reojax.cli._arguments import BadInput
 from reojax.cli._axes import AXES, axis, check_names
 from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_amplitudes
+from reojax.cli._numbers import whole
 from reojax.cli._results import add_files, check_files, complaint, table, write
 from reojax.cli._robot import add_robot, layout_of, robot_of
 
@@ -37,10 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_files(parser)
     add("--store", metavar="FOLDER", help="keep finished chunks here, and go on from them when run again")
     add("--shard", type=shard, metavar="I/N", help="only every N-th chunk from the I-th on, I from 0 to N-1")
-    add("--chunk-size", type=positive, metavar="DESIGNS", help="designs in a chunk [by the size of the sweep]")
-    add("--devices", type=positive, metavar="K", help="use K devices of this host [all; every core is one]")
+    add("--chunk-size", type=whole, metavar="DESIGNS", help="designs in a chunk [by the size of the sweep]")
+    add("--devices", type=whole, metavar="K", help="use K devices of this host [all; every core is one]")
     add("--coordinator", metavar="HOST:PORT", help="run as one of several processes, which meet here")
-    add("--processes", type=positive, metavar="N", help="how many they are")
+    add("--processes", type=whole, metavar="N", help="how many they are")
     add("--process-id", type=int, metavar="K", help="which one this is, from 0 to N-1; 0 runs on HOST")
     add("--quiet", action="store_true", help="show no progress")
 
@@ -112,13 +113,6 @@ def shard(text: str) -> tuple[int, int]:
     if not (first.isdecimal() and parts.isdecimal() and int(first) < int(parts)):
         raise argparse.ArgumentTypeError(f"{text!r} is not I/N with I from 0 to N-1")
     return int(first), int(parts)
-
-
-def positive(text: str) -> int:
-    """Read a positive whole number (an argparse type)."""
-    if not (text.isdecimal() and int(text) > 0):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a positive whole number")
-    return int(text)
 
 
 def _check(args: argparse.Namespace) -> None:

@@ -6,7 +6,8 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from reojax._internal.display_units import RPM
-from reojax.cli._arguments import BadInput, version
+from reojax._internal.version import version
+from reojax.cli._arguments import BadInput
 from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
 from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path

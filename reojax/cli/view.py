@@ -9,7 +9,7 @@ from reojax.cli._arguments import BadInput
 from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
 from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_manoeuvre, heading, path_of
-from reojax.cli._motors import seconds
+from reojax.cli._numbers import seconds
 from reojax.cli._robot import robot_of
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array, common_float
 from reojax.collision.chains import Geometry, Structure, acceleration_bound, geometry_of, structure_of, unit_axes
-from reojax.collision.clearance import clearances, radii
+from reojax.collision.clearance import radii
 from reojax.collision.placement import pair_ends
 from reojax.collision.segments import quick_distance, segment_distance
 from reojax.robot import Robot
@@ -33,18 +33,6 @@ _SAMPLES = 96
 """Samples of a path by default, one an edge at least."""
 _GROUPS = 12
 """Most conditions by default: the edges of a longer path share some."""
-
-
-def edge_clearances(robot: Robot, waypoints: Float[Array, "v j"], samples: int) -> Float[jax.Array, "e k p"]:
-    """Clearance of all pairs at k = `samples + 1` equally spaced postures of each edge, both ends included [m].
-
-    Unchecked, with derivatives; `waypoints` has two corners or more.
-    """
-    points = jnp.asarray(waypoints)
-    share = jnp.linspace(0, 1, samples + 1, dtype=points.dtype)[None, :, None]
-    postures = points[:-1, None] + share * (points[1:] - points[:-1])[:, None]
-    found = clearances(robot, postures.reshape(-1, points.shape[1]))
-    return jnp.asarray(found).T.reshape(len(points) - 1, samples + 1, -1)
 
 
 def clearance_shortfall(

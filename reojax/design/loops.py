@@ -98,6 +98,7 @@ def _of_moves(kind: str, robot: Robot, edges: np.ndarray, start: ArrayLike, name
     """Loops whose edges are `edges` (e, j, k) times k moves, each with a part up and a part down."""
     low, high, origin = limits_of(robot, start, name)
     count = edges.shape[2]
+    # travel of a unit of each part; its largest useful size; corners as running sums of the edges
     price = np.tile(np.abs(edges).sum((0, 1)), 2)
     reach = np.einsum("ejk,j->k", np.abs(edges) > 0, high - low) / (np.abs(edges) > 0).sum((0, 1))
     corner = np.cumsum(edges, axis=0)

@@ -22,6 +22,7 @@ from reojax.design.variables import Space, Variable
 from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation
 from reojax.optimisation.functions import Functions
 from reojax.optimisation.optimise import Solution, optimise
+from reojax.optimisation.status import describe
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -65,6 +66,21 @@ class Solutions(NamedTuple):
     best: Int[np.ndarray, " k"]
     """Which start is best for each problem: of least cost among the converged, else of least residual."""
 
+    @property
+    def violation(self) -> Float[np.ndarray, "k s"]:
+        """Another name for `residual`, the one that all solvers' results have."""
+        return self.residual
+
+    @property
+    def error(self) -> Float[np.ndarray, "k s"]:
+        """Another name for `residual`."""
+        return self.residual
+
+    @property
+    def message(self) -> list[list[str]]:
+        """Why each start of each problem ended, in words."""
+        return [list(describe(row)) for row in self.status]
+
     def pick(self) -> Solution:
         """The best answer of each problem, the problems in front."""
         rows = np.arange(len(self.best)), self.best
@@ -79,7 +95,7 @@ class _Limits(NamedTuple):
     tolerance: float
     slope_tolerance: float
     max_steps: int
-    progress: str | None
+    progress: bool | str
 
 
 class Problem:
@@ -192,7 +208,7 @@ class Problem:
         tolerance: float = 1e-8,
         slope_tolerance: float = 1e-6,
         max_steps: int = 200,
-        progress: str | None = None,
+        progress: bool | str = False,
     ) -> Solution:
         """Solve from many starts by `optimise`.
 
@@ -206,7 +222,7 @@ class Problem:
             tolerance: of `optimise`, and so are `slope_tolerance`, `max_steps` and `progress`.
             slope_tolerance: largest slope.
             max_steps: most steps of a start.
-            progress: what to write before a bar on stderr.
+            progress: whether to show a bar on stderr, or what to write before it.
 
         Raises:
             ValueError: for an unknown name or a value outside of its bounds; and as `optimise`.
@@ -236,7 +252,7 @@ class Problem:
         tolerance: float = 1e-8,
         slope_tolerance: float = 1e-6,
         max_steps: int = 200,
-        progress: str | None = None,
+        progress: bool | str = False,
     ) -> Solutions:
         """Solve many problems that differ by the values of some variables, side by side, each from every start.
 
@@ -254,7 +270,7 @@ class Problem:
             tolerance: of `optimise`, and so are `slope_tolerance`, `max_steps` and `progress`.
             slope_tolerance: largest slope.
             max_steps: most steps of a start.
-            progress: what to write before a bar on stderr.
+            progress: whether to show a bar on stderr, or what to write before it.
 
         Raises:
             ValueError: for no values, different numbers of them, an unknown name or a value outside of its bounds; and

@@ -74,11 +74,11 @@ class Spread(NamedTuple):
     share: Float[np.ndarray, " k"]
     """Part of the covariance's trace that each error makes."""
     sampled: Float[np.ndarray, "3 3"]
-    """Mean of `turn turn^T` over the samples, about the nominal result [rad^2]."""
+    """Mean of `turn turn^T` over the draws, about the nominal result [rad^2]."""
     sampled_mean: Float[np.ndarray, " 3"]
-    """Mean turn of the samples [rad]: what the linear rule leaves out."""
-    turns: Float[np.ndarray, "samples 3"]
-    """Turns of the samples [rad]."""
+    """Mean turn of the draws [rad]: what the linear rule leaves out."""
+    turns: Float[np.ndarray, "draws 3"]
+    """Turns of the draws [rad]."""
     frame: str
 
 
@@ -118,7 +118,7 @@ def spread(
     path: Path,
     tolerances: Mapping[str, ArrayLike],
     *,
-    samples: int = 1000,
+    draws: int = 1000,
     seed: int = 0,
     frame: Frame = "start",
     steps: int = DEFAULT_STEPS,
@@ -131,22 +131,22 @@ def spread(
         tolerances: standard deviations by field: relative for "mass" (the link's inertia goes with it), "inertia",
             "rotor_inertia" and "gear_ratio"; in m for "com" and "anchor", each component; in rad for "axis", two
             tilts. One number, or one for every link or joint.
-        samples: robots drawn for the Monte Carlo check, normal errors (relative ones lognormal); run by `sweep`.
+        draws: robots drawn for the Monte Carlo check, normal errors (relative ones lognormal); run by `sweep`.
         seed: of the draw.
         frame: frame of the turns, see this module.
         steps: steps per edge of `net_rotation`.
 
     Raises:
-        ValueError: for unknown fields, negative tolerances, an unknown frame, or too few samples.
+        ValueError: for unknown fields, negative tolerances, an unknown frame, or too few draws.
     """
     from reojax.sweeps import sweep, zipped
 
     _check_frame(frame)
-    checks.whole("samples", samples, 2)
+    checks.whole("draws", draws, 2)
     sources = sources_of(robot, tolerances)
     nominal = net_rotation(robot, path, steps=steps)
     jacobian = np.asarray(_jacobian(without_names(robot), path, sources, steps))  # (3, k)
-    errors = np.random.default_rng(seed).normal(size=(samples, len(sources.name)))
+    errors = np.random.default_rng(seed).normal(size=(draws, len(sources.name)))
 
     def turn(**error: Array) -> Array:
         other = perturb(robot, sources, jnp.stack([error[f"e{i}"] for i in range(len(sources.name))]))
@@ -163,7 +163,7 @@ def spread(
         deviation=np.sqrt(np.diag(covariance)),
         source=sources.name,
         share=shares / max(shares.sum(), np.finfo(float).tiny),
-        sampled=turns.T @ turns / samples,
+        sampled=turns.T @ turns / draws,
         sampled_mean=turns.mean(0),
         turns=turns,
         frame=frame,

@@ -162,13 +162,18 @@ def edge_momentum(
     rate = jnp.asarray(end - start)
     fraction = jnp.linspace(0, 1, rotations.shape[0], dtype=rotations.dtype)
     pose = jax.vmap(lambda theta: kinematics(robot, theta))(start[None] + rate[None] * fraction[:, None])
+    # pose of every link in the inertial frame; the base's own motion is in the rotations alone
     turn = _product("sab,sibc->siac", rotations, pose.rotation)
     place = _product("sab,sib->sia", rotations, pose.com)
     axis = _product("sab,skb->ska", rotations, pose.axis)
+    # angular velocity of each link, by differences of its rotation: hat(omega) = R^T R'
     spinning = _product("siba,sibc->siac", turn, _derivative(turn))  # hat of the angular velocity, link frame
     omega = 0.5 * jnp.stack([spinning[..., i, k] - spinning[..., k, i] for i, k in ((2, 1), (0, 2), (1, 0))], -1)
+    # R I omega, about the link's own centre of mass
     spin = _product("siab,ibc,sic->sia", turn, robot.inertia, omega)
+    # m p x p', about the common centre of mass, which rests
     orbit = robot.mass[None, :, None] * jnp.cross(place, _derivative(place))
+    # J N theta_dot of each rotor, relative to its stator
     side = np.array([1 if side == "parent" else -1 for side in robot.rotor_on], rotations.dtype)
     rotor = (robot.rotor_inertia * robot.gear_ratio * side * rate)[None, :, None] * axis
     parts = jnp.concatenate([spin, orbit, rotor], axis=1)

@@ -125,7 +125,7 @@ class UnknownBox(NamedTuple):
     scale: np.ndarray
 
 
-def least_duration(task: Task, starts: np.ndarray, box: UnknownBox, max_steps: int, progress: str | None) -> Fastest:
+def least_duration(task: Task, starts: np.ndarray, box: UnknownBox, max_steps: int, progress: bool | str) -> Fastest:
     """Solve a task from several starts, (m, n); the best answer is polished, and run as fast as its motors allow."""
     robot = jax.tree.map(lambda leaf: jnp.asarray(leaf, float), task.robot)
     motors = per_joint(task.motors, np.dtype(float))

@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from reojax import so3
 from reojax._internal.arrays import Array
+from reojax.optimisation.status import Status
 from reojax.robot import Robot
 
 SAFETY = 4.0
@@ -48,6 +49,14 @@ class Resolution(NamedTuple):
 def target_error(dtype: np.dtype) -> float:
     """Error of an orientation that is aimed at [rad]."""
     return 1e-8 if dtype == np.float64 else 1e-4
+
+
+def resolution_status(error: Float[Array, ""] | None, rotation: Float[Array, "m 3 3"]) -> Int[Array, ""]:
+    """Return the `Status` of a motion of that estimated error: out of steps where it is more than is aimed at."""
+    if error is None:
+        raise ValueError("this motion has no `error`: nothing is known of its accuracy.")
+    fine = jnp.where(error <= target_error(np.dtype(rotation.dtype)), Status.CONVERGED, Status.OUT_OF_STEPS)
+    return jnp.where(jnp.isfinite(rotation).all() & ~jnp.isnan(error), fine, Status.NOT_FINITE)
 
 
 def error_by_halving(fine: Float[Array, "s+1 3 3"], coarse: Float[Array, "s/2+1 3 3"], order: int) -> Float[Array, ""]:

@@ -29,11 +29,11 @@ def overlap(
     robot: Robot,
     path: Path,
     motors: Motor | Sequence[Motor],
-    law: Law | str | None = None,
+    law: Law | str = "quintic",
     *,
     clearance: float | None = None,
     max_steps: int = 100,
-    progress: str | None = None,
+    progress: bool | str = False,
 ) -> Fastest:
     """Run a path with its edges overlapped: each joint's move in each edge gets a time of its own.
 
@@ -44,16 +44,16 @@ def overlap(
         robot: the robot; its rotor inertias and gear ratios hold, and its limits.
         path: the path in shape space, with numbers that can be read: not under `jit`.
         motors: motors of the joints, one for all or one for each.
-        law: the time law of every move, or its name; default `quintic()`.
+        law: the time law of every move, or its name.
         clearance: least distance between the robot's parts, from 0 up, that is proven to be kept at all times [m];
             default not asked. Both ends of the path must have it.
         max_steps: most steps of the optimiser.
-        progress: what to write before a bar on stderr; default no bar.
+        progress: whether to show a bar on stderr, or what to write before it.
 
     Raises:
         ValueError: as `minimum_time`, for a path that stays where it is, and for ends that do not have the clearance.
     """
-    law = quintic() if law is None else check_law(law)
+    law = check_law(law)
     checks.whole("max_steps", max_steps)
     _check_moves(path)
     least = minimum_time(robot, path, motors, law)
@@ -96,7 +96,7 @@ def free_law(
     points: int = 5,
     clearance: float | None = None,
     max_steps: int = 100,
-    progress: str | None = None,
+    progress: bool | str = False,
 ) -> Fastest:
     """Run a path, corners and all, by the fastest time law of each edge: a spline through `points` free points.
 
@@ -110,7 +110,7 @@ def free_law(
         clearance: least distance between the robot's parts, from 0 up, that is proven to be kept at all times [m];
             default not asked. The path must have it.
         max_steps: most steps of the optimiser.
-        progress: what to write before a bar on stderr; default no bar.
+        progress: whether to show a bar on stderr, or what to write before it.
 
     Raises:
         ValueError: as `overlap`, and for `points` that is no positive integer.
@@ -159,7 +159,7 @@ def fastest_loop(
     seed: int = 0,
     clearance: float | None = None,
     max_steps: int = 200,
-    progress: str | None = None,
+    progress: bool | str = False,
 ) -> Fastest:
     """The fastest closed motion with a given net rotation: a spline of free knots at free times, at rest at both ends.
 
@@ -174,7 +174,7 @@ def fastest_loop(
         clearance: least distance between the robot's parts, from 0 up, that is proven to be kept at all times [m];
             default not asked. The posture where `near` begins must have it.
         max_steps: most steps of the optimiser.
-        progress: what to write before a bar on stderr; default no bar.
+        progress: whether to show a bar on stderr, or what to write before it.
 
     Raises:
         ValueError: as `minimum_time`, for a target that is no rotation, fewer than 3 `knots`, no `starts`, or a path

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array, common_float, is_concrete
@@ -25,6 +25,7 @@ from reojax.mechanics.own_units import without_names
 from reojax.motion.motor import Motor, check_motors, demand, per_joint
 from reojax.motion.time_laws import Law, check_law
 from reojax.motion.trajectory import State, Trajectory, along, polynomial
+from reojax.optimisation.status import Status
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -53,6 +54,42 @@ class LeastTime(NamedTuple):
     """Least duration that each joint's motor alone would allow [s]."""
     clearance: Array | None = None
     """Least distance of the robot's parts along the path, proven [m]; None if it was not asked for."""
+
+    @property
+    def value(self) -> Float[Array, " e"]:
+        """The durations, under the name that all solvers' results have."""
+        return self.durations
+
+    @property
+    def cost(self) -> Float[Array, ""]:
+        """Their sum [s]."""
+        return self.duration
+
+    @property
+    def violation(self) -> Float[Array, ""]:
+        """How far a motor is beyond its torque-speed line at the samples: 0, as the durations solve for it."""
+        return jnp.zeros_like(self.duration)
+
+    @property
+    def error(self) -> Float[Array, ""]:
+        """What is left of the equation that the durations solve at the samples: 0."""
+        return jnp.zeros_like(self.duration)
+
+    @property
+    def status(self) -> Int[Array, ""]:
+        """Converged; or unreachable, where no time is long enough, which is an error unless numbers are traced."""
+        lost = jnp.where(jnp.isnan(self.duration), Status.NOT_FINITE, Status.UNREACHABLE)
+        return jnp.where(jnp.isfinite(self.duration), Status.CONVERGED, lost)
+
+    @property
+    def converged(self) -> Bool[Array, ""]:
+        """Whether the durations are finite."""
+        return jnp.isfinite(self.duration)
+
+    @property
+    def message(self) -> str:
+        """How it ended, in words."""
+        return Status(int(self.status)).text
 
 
 def minimum_time(

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
@@ -32,6 +32,7 @@ from reojax.mechanics.kinematics import kinematics
 from reojax.mechanics.own_units import without_names
 from reojax.motion.motor import Motor, check_motors, drive, per_joint
 from reojax.motion.trajectory import Trajectory
+from reojax.optimisation.status import Status
 from reojax.robot import Robot
 
 COUNTS = 512.0
@@ -80,6 +81,42 @@ class Tracking(NamedTuple):
     """Torque that each motor gives at this sample [N m]."""
     saturated: Bool[Array, "m j"]
     """Whether that is less than is asked for."""
+
+    @property
+    def value(self) -> Float[Array, "m j"]:
+        """The joint angles, under the name that all solvers' results have."""
+        return self.theta
+
+    @property
+    def cost(self) -> Float[Array, ""]:
+        """Root mean square of what the joints are off the plan [rad]."""
+        return jnp.sqrt(((self.theta - self.planned) ** 2).mean())
+
+    @property
+    def error(self) -> Float[Array, ""]:
+        """Farthest that a joint is off the plan at the end [rad]."""
+        return jnp.abs(self.theta[-1] - self.planned[-1]).max()
+
+    @property
+    def violation(self) -> Float[Array, ""]:
+        """Largest torque that was asked for and that a motor could not give [N m]."""
+        return jnp.abs(self.command - self.motor_torque).max()
+
+    @property
+    def status(self) -> Int[Array, ""]:
+        """Converged where the motors gave all that was asked for; else saturated, or not finite."""
+        held = jnp.where(self.saturated.any(), Status.SATURATED, Status.CONVERGED)
+        return jnp.where(jnp.isfinite(self.theta).all(), held, Status.NOT_FINITE)
+
+    @property
+    def converged(self) -> Bool[Array, ""]:
+        """Whether the motors gave all that was asked for, and all numbers are finite."""
+        return self.status == Status.CONVERGED
+
+    @property
+    def message(self) -> str:
+        """How it ended, in words."""
+        return Status(int(self.status)).text
 
 
 def gains(robot: Robot, bandwidth: ArrayLike, theta: ArrayLike | None = None) -> Gains:

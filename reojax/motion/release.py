@@ -17,7 +17,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
 from reojax import so3
@@ -36,11 +36,13 @@ from reojax.motion._resolution import (
     over_nodes,
     quietly,
     refine,
+    resolution_status,
     spin_bounds,
     start_count,
     target_error,
 )
 from reojax.motion.trajectory import Trajectory, polynomial
+from reojax.optimisation.status import Status
 from reojax.robot import Robot
 
 DEFAULT_STEPS = 32
@@ -74,6 +76,26 @@ class Released(NamedTuple):
     error: Float[Array, ""]
     """Estimate of how far any `rotation` may be wrong by the steps taken, not by the robot's numbers [rad]."""
 
+    @property
+    def value(self) -> Float[Array, "m 3 3"]:
+        """The orientations, under the name that all solvers' results have."""
+        return self.rotation
+
+    @property
+    def status(self) -> Int[Array, ""]:
+        """Converged where `error` is what steps that are chosen aim at; else out of steps, or not finite."""
+        return resolution_status(self.error, self.rotation)
+
+    @property
+    def converged(self) -> Bool[Array, ""]:
+        """Whether `error` is below 1e-8 rad (1e-4 in float32)."""
+        return self.status == Status.CONVERGED
+
+    @property
+    def message(self) -> str:
+        """How it ended, in words."""
+        return Status(int(self.status)).text
+
 
 class ReleaseSpread(NamedTuple):
     """Net rotation after an uncertain release."""
@@ -101,7 +123,7 @@ def released(
     trajectory: Trajectory,
     release: Release | None = None,
     *,
-    steps: int = DEFAULT_STEPS,
+    samples: int = DEFAULT_STEPS,
     substeps: int | None = None,
 ) -> Released:
     """Orientation and momentum of a robot that does a joint motion after a release.
@@ -110,8 +132,8 @@ def released(
         robot: the robot.
         trajectory: its joints' motion, as `along` makes it from a path, a time law and durations.
         release: how it is let go; default perfectly.
-        steps: parts of each piece of the trajectory at whose ends the motion is told, static.
-        substeps: integration steps of each part, static; fourth order. Default as many as bring `Released.error` below
+        samples: samples of each piece of the trajectory, static.
+        substeps: integration steps of each, static; fourth order. Default as many as bring `Released.error` below
             1e-8 rad (1e-4 in float32), by how far the robot turns, and is braked, in a step; one where numbers are
             traced.
 
@@ -122,12 +144,14 @@ def released(
     Warns:
         UserWarning: if the orientation is uncertain by more than 1e-3 rad with all the steps that are taken unasked.
     """
-    given = _check_release(robot, trajectory, Release() if release is None else release, steps)
+    given = _check_release(
+        robot, trajectory, Release() if release is None else release, checks.whole("samples", samples)
+    )
 
     plain = without_names(given[0])
 
     def run(count: int) -> tuple[Released, Resolution]:
-        return _simulate_release(plain, *given[1:], int(steps), count)
+        return _simulate_release(plain, *given[1:], samples, count)
 
     if substeps is not None:
         return quietly(run, checks.whole("substeps", substeps))[0]
@@ -136,9 +160,9 @@ def released(
     least, most = _turn_bounds(*given)
     return refine(
         run,
-        first=start_count(1, 1, most / steps),
-        hopeless=least / steps,
-        steps=trajectory.pieces * int(steps),
+        first=start_count(1, 1, most / samples),
+        hopeless=least / samples,
+        steps=trajectory.pieces * samples,
         order=_ORDER,
         target=target_error(given[2].dtype),
         what=f"{robot.name!r} after this release",

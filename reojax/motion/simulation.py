@@ -14,7 +14,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
@@ -30,6 +30,7 @@ from reojax.motion._resolution import (
     over_nodes,
     quietly,
     refine,
+    resolution_status,
     spin_bounds,
     start_count,
     target_error,
@@ -37,6 +38,7 @@ from reojax.motion._resolution import (
 from reojax.motion.motor import Motor, check_motors, drive, per_joint
 from reojax.motion.time_laws import Law
 from reojax.motion.trajectory import State, Trajectory, along, polynomial
+from reojax.optimisation.status import Status
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -77,6 +79,26 @@ class Motion(NamedTuple):
     """`1 - |voltage| / supply`: distance to the torque-speed line, in stall torques; negative beyond it."""
     error: Float[Array, ""] | None = None
     """Estimate of how far any `rotation` may be wrong by the steps taken, not by the robot's numbers [rad]."""
+
+    @property
+    def value(self) -> Float[Array, "m 3 3"]:
+        """The orientations, under the name that all solvers' results have."""
+        return self.rotation
+
+    @property
+    def status(self) -> Int[Array, ""]:
+        """Converged where `error` is what steps that are chosen aim at; else out of steps, or not finite."""
+        return resolution_status(self.error, self.rotation)
+
+    @property
+    def converged(self) -> Bool[Array, ""]:
+        """Whether `error` is below 1e-8 rad (1e-4 in float32)."""
+        return self.status == Status.CONVERGED
+
+    @property
+    def message(self) -> str:
+        """How it ended, in words."""
+        return Status(int(self.status)).text
 
 
 def simulate(
@@ -205,6 +227,7 @@ def orientation_along(
     at_nodes = jax.vmap(jax.vmap(jax.vmap(polynomial, (None, 0)), (None, 0)))
     state = at_nodes(trajectory.coefficients, within)
 
+    # omega = A^-1 B theta_dot + A^-1 R^T H at every node: its own part, and what multiplies R^T H
     def turning(theta: Array, theta_dot: Array) -> tuple[Array, Array]:
         A, B = momentum_matrices(robot, theta)
         both = solve_symmetric3(A, jnp.concatenate([(B @ theta_dot)[:, None], jnp.eye(3, dtype=dtype)], axis=1))
@@ -215,10 +238,12 @@ def orientation_along(
     steps = trajectory.pieces * count
     step = jnp.repeat(length / count, count)
     own, mobility = own.reshape(steps, -1, 3), mobility.reshape(steps, -1, 3, 3)
+    # the same motion by all steps and by half of them, side by side: their distance is the error
     lengths = jnp.stack([step, _half(2 * step[::2])])
     both_own, both_mobility = (jnp.stack([x, _half(_coarse(x))]) for x in (own, mobility))
     integrate = jax.vmap(orientations, (0, 0, 0, None))  # one loop, compiled once
     fine, coarse = integrate(lengths, both_own, both_mobility, momentum)
+    # bound of the turn in a step, |A^-1 B theta_dot| + |A^-1| |H|
     rate = jnp.sqrt((own**2).sum(-1)) + jnp.sqrt((mobility**2).sum((-1, -2)) * (momentum**2).sum())
     error = error_by_halving(fine, coarse[: steps // 2 + 1], _ORDER)
     resolution = Resolution(error, jax.lax.stop_gradient((step[:, None] * rate).max()))

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from tqdm import tqdm
 
 from reojax._internal import checks
+from reojax._internal.progress import label
 from reojax.optimisation.arguments import check_starts, check_tolerances
 from reojax.optimisation.functions import Function, Functions, Programs
 from reojax.optimisation.sqp import Iterates, Problem, minimise
@@ -73,7 +74,7 @@ def optimise(
     tolerance: float = 1e-8,
     slope_tolerance: float = 1e-6,
     max_steps: int = 200,
-    progress: str | None = None,
+    progress: bool | str = False,
 ) -> Solution:
     """Minimise `cost(x)` with `equality(x) = 0`, `inequality(x) <= 0`, `lower <= x <= upper`, from every start.
 
@@ -96,7 +97,7 @@ def optimise(
         tolerance: largest violation of a constraint, in its units. Something near 1e-5 in float32.
         slope_tolerance: largest slope, see `Solution`.
         max_steps: most steps of a start.
-        progress: what to write before a bar on stderr; default no bar.
+        progress: whether to show a bar on stderr, or what to write before it.
 
     Raises:
         ValueError: naming the argument, its value and the rule, for bounds the wrong way round, a start outside,
@@ -117,7 +118,7 @@ def optimise_together(
     tolerance: float = 1e-8,
     slope_tolerance: float = 1e-6,
     max_steps: int = 200,
-    progress: str | None = None,
+    progress: bool | str = False,
 ) -> Solution:
     """As `optimise`, of one `function` to (cost, equality, inequality), for these share most of their work."""
     functions = Functions(None, (), (), data is not None, function)
@@ -134,7 +135,7 @@ def _run(
     tolerance: float,
     slope_tolerance: float,
     max_steps: int,
-    progress: str | None,
+    progress: bool | str,
 ) -> Solution:
     x, box = check_starts(starts, lower, upper, scale, data)
     check_tolerances(tolerance=tolerance, slope_tolerance=slope_tolerance)
@@ -156,7 +157,7 @@ def _run(
         slope_tolerance=float(slope_tolerance),
         max_steps=int(max_steps),
     )
-    with tqdm(total=len(x), desc=progress, unit="start", file=sys.stderr, disable=progress is None) as bar:
+    with tqdm(total=len(x), desc=label(progress), unit="start", file=sys.stderr, disable=not progress) as bar:
         ended = minimise(problem, x / box.scale, lambda count: bar.update(count - bar.n))
     return _solution(ended, box.lower, box.upper, box.scale, x.dtype)
 

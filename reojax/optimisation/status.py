@@ -21,6 +21,7 @@ class Status(IntEnum):
     INFEASIBLE = 4
     NOT_FOUND = 5
     UNREACHABLE = 6
+    SATURATED = 7
 
     @property
     def text(self) -> str:
@@ -36,6 +37,7 @@ _TEXTS = {
     Status.INFEASIBLE: "infeasible: near here the constraints cannot all be met; this is where they are violated least",
     Status.NOT_FOUND: "not found: the search ended without an answer within the tolerance, which proves nothing",
     Status.UNREACHABLE: "unreachable: no answer exists within the limits given",
+    Status.SATURATED: "saturated: what was asked for is more than the motors can give at times",
 }
 
 

@@ -102,7 +102,7 @@ def shorten_candidates(context: Context, targets: np.ndarray, rows: Candidates) 
 
 def settle(context: Context, targets: np.ndarray, rows: Candidates, tolerance: float) -> Candidates:
     """Solve rows on the true net rotations; `square` is then true, and amplitudes are the best seen."""
-    best = rows._replace(square=np.full(rows.square.shape, np.inf))
+    best = rows._replace(x=rows.x.copy(), square=np.full(rows.square.shape, np.inf))  # its own arrays
     x, strength = rows.x.copy(), np.full(rows.square.shape, _SOFTEST)
     going = np.arange(len(rows.owner))
     for _ in range(_NEWTON):

@@ -61,7 +61,7 @@ class Answer:
         slots = SIZES[-1]
         square = 4 * (targets[1:] ** 2).sum(0)
         empty = np.full((slots, m), -1), np.ones((slots, m)), np.zeros((d, slots, m)), square
-        self.rows = Candidates(np.arange(m), *empty)
+        self.rows = Candidates(np.arange(m), *empty)  # arrays of its own, which `update_best` writes into
         self.travel = np.zeros(m)
         self.tolerance = tolerance
         self._box = scene.box

@@ -54,6 +54,26 @@ class FreePaths(NamedTuple):
     clearance: Any
     """Least distance of the robot's parts along the path, proven [m], (m,) of many; None if it was not asked for."""
 
+    @property
+    def value(self) -> Float[np.ndarray, "*m v j"]:
+        """The corners, under the name that all solvers' results have."""
+        return self.waypoints
+
+    @property
+    def cost(self) -> Float[np.ndarray, "*m"]:
+        """Joint travel [rad]."""
+        return self.travel
+
+    @property
+    def violation(self) -> Float[np.ndarray, "*m"]:
+        """How far a joint passes its limits [rad]: 0, as no answer ever leaves its box."""
+        return np.zeros_like(self.error)
+
+    @property
+    def message(self) -> Any:
+        """How it ended: `status`, under the name that all solvers' results have."""
+        return self.status
+
     def __str__(self) -> str:
         """Corners, runs, and how the path ends; of many paths how many are reached."""
         if np.ndim(self.error):
@@ -82,7 +102,7 @@ def free_path(
     tolerance: float = 1e-9,
     max_steps: int = 100,
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | str = False,
 ) -> FreePaths:
     """Find a joint path of little travel after which the base has turned by `target` (3, 3); any tree robot.
 
@@ -134,7 +154,7 @@ def free_paths(
     tolerance: float = 1e-9,
     max_steps: int = 100,
     seed: int = 0,
-    progress: bool = False,
+    progress: bool | str = False,
 ) -> FreePaths:
     """Find joint paths of little travel after which the base has turned by the targets; any tree robot.
 
@@ -165,7 +185,7 @@ def free_paths(
         tolerance: angle to the target that counts as reached [rad].
         max_steps: most steps of the solver.
         seed: of the random polygons.
-        progress: whether to show a bar on stderr.
+        progress: whether to show a bar on stderr, or what to write before it.
 
     Returns:
         The paths. Where a target is not reached, the closest path found, with `converged` False and the reason in
@@ -213,7 +233,7 @@ def _solve(
     tolerance: float,
     max_steps: int,
     seed: int,
-    progress: bool,
+    progress: bool | str,
     clear: Clear | None,
 ) -> FreePaths:
     count = len(freedom.joints)

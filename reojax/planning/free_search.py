@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from reojax._internal.progress import label
 from reojax.optimisation.optimise import optimise
 from reojax.planning import quaternions
 from reojax.planning.clear_paths import Clear
@@ -74,11 +75,11 @@ class Search:
         self._bar: Any = None
 
     @contextmanager
-    def bar(self, show: bool) -> Iterator[None]:
+    def bar(self, show: bool | str) -> Iterator[None]:
         """Count polygons on stderr."""
         from tqdm import tqdm
 
-        with tqdm(total=0, disable=not show, unit=" polygons", desc="free paths") as self._bar:
+        with tqdm(total=0, disable=not show, unit=" polygons", desc=label(show) or "free paths") as self._bar:
             yield
 
     def shortest(self, targets: np.ndarray, runs: np.ndarray, hints: np.ndarray | None = None) -> np.ndarray:

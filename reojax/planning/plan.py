@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
+from reojax._internal.progress import label
 from reojax.collision.refusal import check_clearance
 from reojax.manoeuvres import Layout, fold_angles
 from reojax.mechanics.controllable import controllable_directions
@@ -85,7 +86,7 @@ def plan(
     limits = {"twist_limit": twist_limit, "bend_limit": bend_limit, "max_manoeuvres": max_manoeuvres}
     choices = {"objective": objective, "vocabulary": vocabulary, "layout": layout, "tolerance": tolerance}
     choices["clearance"] = clearance
-    return first_of(plan_many(robot, targets, **limits, **choices))
+    return first_of(_plans(robot, targets, **limits, **choices))
 
 
 def plan_many(
@@ -100,14 +101,24 @@ def plan_many(
     layout: Layout | None = None,
     clearance: float | None = None,
     tolerance: float = 1e-9,
-    progress: bool = False,
+    progress: bool | str = False,
 ) -> Plan:
     """Plan for many targets (m, 3, 3): `plan` with a leading axis m on every field of the answer.
 
     Runs on the host in batches; with `progress`, a bar on stderr counts the targets.
     """
-    layout = robot_and_layout(robot, layout)
     targets = checks.rotations("targets", targets, (-1, 3, 3))
+    limits = {"twist_limit": twist_limit, "bend_limit": bend_limit, "max_manoeuvres": max_manoeuvres}
+    choices = {"objective": objective, "vocabulary": vocabulary, "layout": layout, "tolerance": tolerance}
+    return _plans(robot, targets, **limits, **choices, clearance=clearance, progress=progress)
+
+
+def _plans(
+    robot: Robot, targets: np.ndarray, *, twist_limit: float, bend_limit: float, max_manoeuvres: int, objective: str,
+    vocabulary: str, layout: Layout | None, clearance: float | None, tolerance: float, progress: bool | str = False,
+) -> Plan:  # fmt: skip
+    """Check all but the targets, (m, 3, 3), which are known to be rotations; and plan."""
+    layout = robot_and_layout(robot, layout)
     twist_limit, bend_limit = _limit("twist_limit", twist_limit), _limit("bend_limit", bend_limit)
     most = checks.whole("max_manoeuvres", max_manoeuvres)
     tolerance = checks.positive("tolerance", tolerance)
@@ -152,7 +163,7 @@ def _prove(found: Plan, clear: Clear) -> Plan:
 def _limit(entry: str, value: float) -> float:
     limit = checks.positive(entry, value)
     if limit > _WIDEST:
-        raise ValueError(f"`{entry}` is {limit:g} rad, more than two turns; is it in degrees?")
+        raise ValueError(f"`{entry}` is {limit:.9g} rad, more than two turns; is it in degrees?")
     return limit
 
 
@@ -233,7 +244,7 @@ def _scene(
     return _scenes.get((*key, None if clear is None else clear.margin), make)
 
 
-def _bar(total: int, show: bool) -> Any:
+def _bar(total: int, show: bool | str) -> Any:
     from tqdm import tqdm
 
-    return tqdm(total=total, disable=not show, unit=" targets", desc="plan")
+    return tqdm(total=total, disable=not show, unit=" targets", desc=label(show) or "plan")

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from reojax._internal import checks
 from reojax._internal.files import check_ending, write_json
 from reojax._internal.json_files import entries, read_object
+from reojax._internal.version import version
 from reojax.mechanics.certificate import Certificate, certify
 from reojax.models.json_file import from_json, to_json
 from reojax.path import Path, polygon
@@ -100,8 +101,6 @@ def save_plan(
     Raises:
         ValueError: if the plan is none or one of many, does not fit the robot, or the path cannot be written.
     """
-    from importlib import metadata
-
     a_robot(robot)
     if not isinstance(plan, Plan | FreePaths):
         raise ValueError(f"`plan` is a {type(plan).__name__}; it must be what `plan` or `free_path` returns.")
@@ -117,7 +116,7 @@ def save_plan(
     data: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
-        "reojax": metadata.version("reojax"),
+        "reojax": version(),
         "robot": to_json(robot),
         "target": target,
         "waypoints": waypoints,

@@ -42,6 +42,26 @@ class Plan(NamedTuple):
     clearance: Any
     """Least distance of the robot's parts along the path, proven [m], (m,) of many; None if it was not asked for."""
 
+    @property
+    def value(self) -> Float[np.ndarray, "*m v j"]:
+        """The corners, under the name that all solvers' results have."""
+        return self.waypoints
+
+    @property
+    def cost(self) -> Float[np.ndarray, "*m"]:
+        """Joint travel [rad]."""
+        return self.travel
+
+    @property
+    def violation(self) -> Float[np.ndarray, "*m"]:
+        """How far a joint passes its limits [rad]: 0, as no answer ever leaves its box."""
+        return np.zeros_like(self.error)
+
+    @property
+    def message(self) -> Any:
+        """How it ended: `status`, under the name that all solvers' results have."""
+        return self.status
+
     def __str__(self) -> str:
         """The word with its amplitudes, and how it ends; of many plans how many are reached."""
         if np.ndim(self.error):

@@ -22,6 +22,7 @@ from tqdm import tqdm
 
 from reojax._internal import checks
 from reojax._internal.files import check_ending, replacing
+from reojax._internal.progress import label
 from reojax.drawing.colours import ANGLES, DASHES, INK, JOINTS, PALE
 from reojax.drawing.view import View
 from reojax.mechanics.attitude import tilt_and_roll
@@ -48,7 +49,7 @@ def animation(
     titles: Sequence[str] | None = None,
     title: str | None = None,
     view: View | None = None,
-    progress: bool = False,
+    progress: bool | str = False,
 ) -> None:
     """Write a film of a robot along a path at zero momentum, every edge equally long; whole or not at all.
 
@@ -61,7 +62,7 @@ def animation(
         titles: a name for each edge.
         title: headline; default the robot's name.
         view: from where to look; default from the front.
-        progress: whether to show progress on stderr.
+        progress: whether to show a bar on stderr, or what to write before it.
 
     Raises:
         ValueError: if the file cannot be written, ffmpeg is missing for .mp4, the path does not fit the robot, or a
@@ -91,7 +92,7 @@ def animate(
     titles: Sequence[str] | None = None,
     title: str | None = None,
     view: View | None = None,
-    progress: bool = False,
+    progress: bool | str = False,
 ) -> None:
     """Write a film of a robot in given poses, equally spaced in time; whole or not at all.
 
@@ -104,7 +105,7 @@ def animate(
         titles: a line above each frame.
         title: headline; default the robot's name.
         view: from where to look; default from the front.
-        progress: whether to show progress on stderr.
+        progress: whether to show a bar on stderr, or what to write before it.
 
     Raises:
         ValueError: if the file cannot be written, ffmpeg is missing for .mp4, a pose does not fit the robot, or a
@@ -144,7 +145,7 @@ def _film(
     titles: Sequence[str] | None,
     title: str | None,
     view: View | None,
-    progress: bool,
+    progress: bool | str,
 ) -> None:
     """Draw frame after frame into one figure, a writer of matplotlib's takes each."""
     count = len(frames.theta)
@@ -164,7 +165,7 @@ def _film(
     beside = target.with_name(f".reojax-{secrets.token_hex(8)}{target.suffix.lower()}")
     try:
         with writer.saving(figure, str(beside), dpi=100):
-            for k in tqdm(order, desc=target.name, unit=" frames", disable=not progress):
+            for k in tqdm(order, desc=label(progress) or target.name, unit=" frames", disable=not progress):
                 place.clear()
                 draw_robot(place, robot, frames.theta[k], frames.rotation[k], view=view)
                 stage(place, low, high, zoom=1.75)

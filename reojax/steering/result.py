@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from reojax.motion.trajectory import Trajectory
+from reojax.optimisation.status import describe
 from reojax.steering.end import basis
 
 
@@ -37,11 +38,31 @@ class Righting(NamedTuple):
     converged: Bool[np.ndarray, "*m"]
     """Whether error and limits are within their tolerances; the effort is then the least found from the starts."""
     status: Int[np.ndarray, "*m"]
-    """How it ended: `reojax.optimisation.status.describe` says it in words."""
+    """How it ended: `message` says it in words."""
     steps: Int[np.ndarray, "*m"]
     """Newton steps of the answer."""
     least_duration: Float[np.ndarray, "*m"]
     """Shortest duration that was found to do, where `duration` would not or none was given; else NaN [s]."""
+
+    @property
+    def value(self) -> Float[np.ndarray, "*m p+1 j"]:
+        """The points, under the name that all solvers' results have."""
+        return self.points
+
+    @property
+    def cost(self) -> Float[np.ndarray, "*m"]:
+        """The effort."""
+        return self.effort
+
+    @property
+    def violation(self) -> Float[np.ndarray, "*m"]:
+        """How far a limit is passed at most, as `beyond`."""
+        return self.beyond
+
+    @property
+    def message(self) -> str | list[str]:
+        """How it ended, in words."""
+        return describe(self.status)
 
     @property
     def trajectory(self) -> Trajectory:

@@ -5,12 +5,12 @@ import hashlib
 import inspect
 import json
 from collections.abc import Callable, Mapping
-from importlib import metadata
 from typing import Any
 
 import jax
 import numpy as np
 
+from reojax._internal.version import version
 from reojax.robot import Robot
 from reojax.sweeps.chunks import Chunking
 from reojax.sweeps.grid import Designs
@@ -32,7 +32,7 @@ def identity(
     program = jax.jit(lambda design: function(**design)).trace(scalars(designs)).lower(lowering_platforms=("cpu",))
     return {
         "schema": SCHEMA,
-        "reojax": _version(),
+        "reojax": version(),
         "jax": jax.__version__,
         "platform": platform,
         "axes": {name: axis_identity(values) for name, values in designs.axes.items()},
@@ -115,13 +115,6 @@ def _of_robot(robot: Robot) -> str:
     for leaf in map(np.asarray, leaves):
         whole.update(f"{leaf.dtype}{leaf.shape}".encode() + leaf.tobytes())
     return whole.hexdigest()
-
-
-def _version() -> str:
-    try:
-        return metadata.version("reojax")
-    except metadata.PackageNotFoundError:
-        return "(not installed)"
 
 
 def _sha256(data: bytes) -> str:

@@ -19,7 +19,7 @@ from reojax.sweeps.store import Store
 
 
 def complete(
-    function: Callable[..., Any], outputs: Outputs, store: Store, mesh: Mesh, mine: range, progress: bool
+    function: Callable[..., Any], outputs: Outputs, store: Store, mesh: Mesh, mine: range, progress: bool | str
 ) -> dict[int, str]:
     """Compute the chunks `mine` that are missing or damaged; return the bad designs of all of `mine`.
 
@@ -36,7 +36,7 @@ def complete(
         missing = _agreed(missing, mine)
     else:
         random.Random(os.urandom(8)).shuffle(missing)
-    show = progress and jax.process_index() == 0
+    show = jax.process_index() == 0 and progress
     with Progress(store.sizes, mine, show=show, done=found, alike=jax.process_count()) as shown:
 
         def todo() -> Iterator[int]:

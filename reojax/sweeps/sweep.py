@@ -38,7 +38,7 @@ def sweep(
     chunk_size: int | None = None,
     store: str | os.PathLike[str] | None = None,
     devices: Devices = None,
-    progress: bool = True,
+    progress: bool | str = True,
     units: Mapping[str, str] | None = None,
     shard: tuple[int, int] | None = None,
 ) -> Sweep:
@@ -62,7 +62,7 @@ def sweep(
         devices: None for all of JAX's devices (or the one that `jax.default_device` sets), a number of this host's
             devices, or a list of devices. A CPU is one device, in which XLA computes mostly in one thread, unless
             `jax.config.update("jax_num_cpu_devices", N)` comes first.
-        progress: whether to show progress on stderr.
+        progress: whether to show a bar on stderr, or what to write before it.
         units: units of axes and results by name, for labels.
         shard: (i, n) to run only every n-th chunk, from the i-th on, `0 <= i < n`; needs a `store`.
 
@@ -87,7 +87,7 @@ def run_sweep(
     chunk_size: int | None,
     store: str | os.PathLike[str] | None,
     devices: Devices,
-    progress: bool,
+    progress: bool | str,
     units: Mapping[str, str] | None,
     shard: tuple[int, int] | None,
 ) -> Sweep:

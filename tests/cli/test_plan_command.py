@@ -87,7 +87,7 @@ def test_a_bad_target_is_one_line_and_status_2(capsys, monkeypatch, tmp_path, ta
     ("option", "value", "message"),
     [
         ("--twist-limit", "0", "`twist_limit` is 0.0; it must be one positive number"),
-        ("--max-manoeuvres", "0", "`max_manoeuvres` is 0; it must be a positive integer"),
+        ("--max-manoeuvres", "0", "argument --max-manoeuvres: '0' is not a positive whole number"),
         ("--out", "a.bmp", "cannot write 'a.bmp'"),
         ("--csv", "a.txt", "cannot write 'a.txt'"),
         ("--robot", "missing.urdf", "missing.urdf"),

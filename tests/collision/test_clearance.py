@@ -207,7 +207,7 @@ def test_prototype_capsules_contain_its_parts():
 def test_what_touches_at_rest_is_told():
     """The cat's halves always touch at the waist, which is said and is no pair."""
     robot = reojax.robots.two_cylinder_cat(0.25)
-    assert any("front, rear" in note and "touch at rest" in note for note in robot.notes)
+    assert any("'front' and 'rear'" in note and "touches at rest" in note for note in robot.notes)
     assert pair_name(robot, 0) == "front (capsule 0) and rear (capsule 3)"
 
 

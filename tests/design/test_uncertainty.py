@@ -68,7 +68,7 @@ TOLERANCES = {"mass": 0.01, "inertia": [0.02, 0.0, 0.03], "com": 1e-3, "axis": 2
 
 @pytest.mark.slow
 def test_linear_rule_and_monte_carlo_agree():
-    found = design.spread(ROBOT, PATH, TOLERANCES, samples=4000, seed=1)
+    found = design.spread(ROBOT, PATH, TOLERANCES, draws=4000, seed=1)
     assert len(found.source) == 3 + 3 + 9 + 4 + 2
     np.testing.assert_allclose(found.share.sum(), 1)
     assert found.share[found.source.index("inertia[1]")] == 0
@@ -88,7 +88,7 @@ def test_one_error_by_hand():
         for k in (np.exp(0.001), np.exp(-0.001))
     )
     slope = (turn(up) - turn(down)) / 0.002
-    found = design.spread(ROBOT, PATH, {"mass": [0, 0.01, 0]}, samples=10)
+    found = design.spread(ROBOT, PATH, {"mass": [0, 0.01, 0]}, draws=10)
     np.testing.assert_allclose(found.covariance, np.outer(slope, slope) * 1e-4, atol=1e-6 * slope @ slope * 1e-4)
 
 
@@ -100,7 +100,7 @@ def test_one_error_by_hand():
         (lambda: design.spread(ROBOT, PATH, {"mass": -0.1}), "must not be negative"),
         (lambda: design.spread(ROBOT, PATH, {"mass": [0.1, 0.2]}), "`mass` has shape"),
         (lambda: design.spread(ROBOT, PATH, {}), "`tolerances` is empty"),
-        (lambda: design.spread(ROBOT, PATH, {"mass": 0.1}, samples=1), "`samples` is 1"),
+        (lambda: design.spread(ROBOT, PATH, {"mass": 0.1}, draws=1), "`draws` is 1"),
     ],
 )
 def test_bad_input_is_named(call, message):

@@ -227,7 +227,7 @@ def test_the_command_line_writes_what_it_says(capsys, monkeypatch, tmp_path):
             ["a.csv", "--duration", "1e-300"],
             "reojax export: argument --duration: '1e-300' is not a duration",
         ),
-        (["a.yaml", "--duration", "1,x"], "reojax export: argument --duration: '1,x' is not a number"),
+        (["a.yaml", "--duration", "1,x"], "reojax export: argument --duration: 'x' is not a number"),
         (["a.yaml", "--duration", "1,2"], "reojax export: argument --duration: 2 numbers for 4 edges"),
         (["a.yaml", "--duration", "1", "--law", "jump"], "reojax export: there is no time law named 'jump'"),
         (["a.yaml", "--duration", "1", "--rate", "0"], "reojax export: argument --rate: '0' must be positive"),

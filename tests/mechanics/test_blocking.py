@@ -96,6 +96,7 @@ def test_net_rotations_and_gradients_in_blocks():
         np.testing.assert_allclose(a[-8:], b, rtol=1e-12, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_a_robot_without_data():
     """All of its numbers are known zeros and ones: the same rotation and slope as with the numbers given as data."""
     ones = reojax.make_robot(

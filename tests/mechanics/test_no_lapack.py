@@ -62,7 +62,7 @@ def test_derivatives(name, mode):
 
 PLAN = reojax.Trajectory(np.array([0.0, 0.002]), CORNERS[None])
 LOOPS = {
-    "released": lambda robot, path: reojax.released(robot, PLAN, reojax.Release((*path[1], 1.0)), steps=2),
+    "released": lambda robot, path: reojax.released(robot, PLAN, reojax.Release((*path[1], 1.0)), samples=2),
     "track": lambda robot, path: reojax.track(robot, PLAN, reojax.RE_MAX_17, reojax.Gains(*path[1] ** 2, 1.0)),
 }
 

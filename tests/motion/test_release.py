@@ -22,7 +22,7 @@ FALLING = Release(momentum=(2e-5, -1e-5, 3e-5), pull=(0.0, 2e-3, -1e-3), tied=(0
 def test_a_perfect_release_is_the_net_rotation():
     motion = released(ROBOT, PLAN)
     np.testing.assert_allclose(motion.rotation[-1], reojax.net_rotation(ROBOT, PATH), atol=2e-6)
-    finer = released(ROBOT, PLAN, steps=64)
+    finer = released(ROBOT, PLAN, samples=64)
     np.testing.assert_allclose(finer.rotation[-1], reojax.net_rotation(ROBOT, PATH), atol=2e-7)
     assert motion.time[-1] == pytest.approx(0.6)
     np.testing.assert_array_equal(motion.momentum, 0)
@@ -31,7 +31,7 @@ def test_a_perfect_release_is_the_net_rotation():
 def test_momentum_alone_is_what_simulate_does():
     momentum = np.array([1e-4, 2e-4, -1e-4])
     expected = reojax.simulate(ROBOT, PLAN, momentum=momentum, samples=64).rotation
-    motion = released(ROBOT, PLAN, Release(momentum), steps=64)
+    motion = released(ROBOT, PLAN, Release(momentum), samples=64)
     np.testing.assert_allclose(motion.rotation, expected, atol=3e-7)
     np.testing.assert_allclose(motion.momentum, np.tile(momentum, (len(motion.time), 1)), rtol=1e-14)
 
@@ -134,8 +134,8 @@ def test_bad_input(arguments, message):
 
 
 def test_more_bad_input():
-    with pytest.raises(ValueError, match="`steps` is 0"):
-        released(ROBOT, PLAN, steps=0)
+    with pytest.raises(ValueError, match="`samples` is 0"):
+        released(ROBOT, PLAN, samples=0)
     with pytest.raises(ValueError, match="`draws` is 0"):
         release_spread(ROBOT, PLAN, Release(), jax.random.key(0), draws=0)
     with pytest.raises(ValueError, match="standard deviations must not be negative"):
@@ -153,7 +153,7 @@ def test_a_wire_that_brakes_hard_is_resolved_or_refused():
         release_spread(ROBOT, PLAN, Release(drag=1.0), jax.random.key(0), draws=1)
 
 
-@pytest.mark.parametrize("duration", [20.0, 40.0])
+@pytest.mark.parametrize("duration", [20.0, pytest.param(40.0, marks=pytest.mark.slow)])
 def test_a_tumbling_body_near_its_middle_axis(duration):
     """Moments 1, 2, 3, spinning almost about the second: as SciPy's DOP853 has it, within what the estimates say."""
     moments, spin = np.array([1.0, 2.0, 3.0]), np.array([1e-3, 2.0, 1e-3])

@@ -55,6 +55,7 @@ def test_clearance_is_a_number_from_zero_up(clearance):
         reojax.free_path(PROTOTYPE, PITCH, clearance=clearance)
 
 
+@pytest.mark.slow
 def test_plans_of_manoeuvres_keep_their_clearance():
     """Pitch by 90 degrees, for which the fewest manoeuvres strike: the plan with 5 mm is another, and proven."""
     limits = {**BOX, "max_manoeuvres": 5}

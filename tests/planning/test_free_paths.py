@@ -167,6 +167,7 @@ def test_coupled_joints_follow_exactly():
     np.testing.assert_allclose(found.travel, np.abs(np.diff(found.waypoints, axis=0)).sum())
 
 
+@pytest.mark.slow
 def test_one_loop_many_times():
     """Within 12 degrees one loop does not do it; the least number does, exactly, and one less does not."""
     narrow = {"lower": -0.2, "upper": 0.2}

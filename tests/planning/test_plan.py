@@ -61,7 +61,7 @@ def test_random_targets_are_reached_within_the_box_and_replay():
         np.testing.assert_array_equal(corners[2::4, 2], signs * plan.twist[m, :k])
 
 
-@pytest.mark.parametrize("loops", [1, 2])
+@pytest.mark.parametrize("loops", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_what_some_manoeuvres_made_takes_no_more(loops):
     """The fewest are found: a plan never takes more loops than the target was made of."""
     targets = planted(np.random.default_rng(loops), loops, 12)

@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from helpers.first_variation import first_variation
 
 import reojax
 from reojax import robots, so3
-from reojax.mechanics.variation import first_variation
 from reojax.steering import onboard
 from reojax.steering.tables import gain_table, write_gains
 

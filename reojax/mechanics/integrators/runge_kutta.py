@@ -88,7 +88,7 @@ def runge_kutta_step(
 
     def stage(slopes: Any, inputs: Any) -> tuple[Any, None]:
         index, part, node = inputs
-        u, y = moved(part, slopes)
+        u, y = moved(part, slopes)  # where this stage looks: what the earlier slopes make of the start
         omega, slope = rates(turned(u), y, node)
         return jax.tree.map(lambda all_, k: all_.at[index].set(k), slopes, (_dexp_inverse(u, omega), slope)), None
 
@@ -96,6 +96,7 @@ def runge_kutta_step(
     chosen = jax.tree.map(lambda leaf: leaf[np.array(method.node)], at_nodes)
     every = (jnp.arange(count), jnp.asarray(method.stages, dtype), chosen)
     slopes, _ = jax.lax.scan(stage, none_yet, every)  # a loop: one stage to compile
+    # the step: R exp(u), so that R stays a rotation
     u, y = moved(jnp.asarray(method.weights, dtype), slopes)
     return turned(u), y
 
