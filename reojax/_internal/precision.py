@@ -8,7 +8,8 @@ from typing import ParamSpec, TypeVar
 import jax
 import numpy as np
 
-Arguments, Answer = ParamSpec("Arguments"), TypeVar("Answer")
+Arguments = ParamSpec("Arguments")
+Answer = TypeVar("Answer")
 
 
 def in_double(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
