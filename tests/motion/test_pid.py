@@ -53,7 +53,7 @@ def test_a_spin_goes_on_while_the_joints_move():
     square = (3 * (end - start) - h * (2 * rate + last)) / h**2
     cube = (2 * (start - end) + h * (rate + last)) / h**3
     joints = reojax.Trajectory(tracking.time, np.stack([start, rate, square, cube], axis=1))
-    expected = reojax.released(ROBOT, joints, reojax.Release(spin), steps=1)
+    expected = reojax.released(ROBOT, joints, reojax.Release(spin), samples=1)
     np.testing.assert_allclose(tracking.rotation, expected.rotation, atol=1e-4)
     still = comparison.joints_simulated(ROBOT, reojax.make_capture(tracking.time, tracking.theta)).rotation
     assert so3.angle(still[-1].T @ tracking.rotation[-1]) > 0.1
