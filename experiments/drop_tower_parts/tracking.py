@@ -69,7 +69,7 @@ def section(out: Path, *, quick: bool, durations: Sequence[float] = DURATIONS) -
     robot = robots.prototype()
     result: dict[str, Any] = {"durations_s": list(durations), "cases": [], "rows": []}
     for manoeuvre, trajectory in plans(durations).items():
-        ideal = released(robot, trajectory, steps=64)
+        ideal = released(robot, trajectory, samples=64)
         for name, (forward, bandwidth) in CASES.items():
             done = track(robot, trajectory, motors(), gains(robot, bandwidth), feedforward=forward, settle=SETTLE)
             done = jax.tree.map(np.asarray, done)

@@ -52,7 +52,7 @@ def _write(path: Any, time: Any, t: Any, delay: Any) -> Any:
 
 
 def _release(momentum: Any, drag: Any, pull: Any) -> Any:
-    return reojax.released(ROBOT, TRAJECTORY, reojax.Release(momentum, pull=pull, drag=drag), steps=4)
+    return reojax.released(ROBOT, TRAJECTORY, reojax.Release(momentum, pull=pull, drag=drag), samples=4)
 
 
 def _merge(folders: Any) -> Any:
