@@ -173,7 +173,7 @@ DEAR: dict[str, tuple[Any, dict[str, Any]]] = {
     ),
     "released": (
         "released",
-        {"robot": ROBOT, "trajectory": TRAJECTORY, "release": reojax.Release(), "steps": 4, "substeps": None},
+        {"robot": ROBOT, "trajectory": TRAJECTORY, "release": reojax.Release(), "samples": 4, "substeps": None},
     ),
     "release": (_release, {"momentum": (0.0, 0.0, 1e-4), "drag": 1e-6, "pull": (0.0, 0.0, 0.0)}),
     "release_spread": (
