@@ -160,6 +160,10 @@ CHEAP: dict[str, tuple[Any, dict[str, Any]]] = {
 }  # fmt: skip
 """What takes some milliseconds."""
 
+COMPILING = """momentum_matrices connection angular_momentum inverse_dynamics joint_inertia curvature link_poses
+centre_of_mass clearance gains so3.exp so3.log so3.from_quaternion view write_mjcf""".split()
+"""Those that compile a program all the same."""
+
 DEAR: dict[str, tuple[Any, dict[str, Any]]] = {
     "net_rotation": ("net_rotation", {"robot": ROBOT, "path": PATH, "steps": 2}),
     "rotation_history": ("rotation_history", {"robot": ROBOT, "path": PATH, "samples": 4}),
