@@ -287,6 +287,7 @@ def _clear_again(search: Search, x: np.ndarray, runs: np.ndarray, targets: np.nd
     """Solve again what came too near between the samples, with more clearance asked for at them; changes `x`."""
     if search.clear is None:
         return
+    search.rounds = 1  # from where they are
     for _ in range(_AGAIN):
         near = moving[~search.clear.kept(search.polygons.paths(x[moving], search.freedom))]
         if not len(near):
