@@ -221,7 +221,7 @@ DEAR: dict[str, tuple[Any, dict[str, Any]]] = {
     ),
     "design.spread": (
         "design.spread",
-        {"robot": ROBOT, "path": PATH, "tolerances": {"mass": 1e-3}, "samples": 4, "seed": 0, "steps": 2},
+        {"robot": ROBOT, "path": PATH, "tolerances": {"mass": 1e-3}, "draws": 4, "seed": 0, "steps": 2},
     ),
     "design.sensitivities": ("design.sensitivities", {"robot": ROBOT, "path": PATH, "steps": 2}),
     "sweep": (_sweep, {"function": lambda a: {"b": a * 2}, "axes": {"a": np.arange(4.0)}, "chunk_size": 2}),
