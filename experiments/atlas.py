@@ -1,6 +1,6 @@
 """An atlas of turns: what twelve robots can do in free fall, what it costs, and how sure that is.
 
-    python experiments/atlas.py                        # all of it, some 25 minutes of processor time
+    python experiments/atlas.py                        # all of it
     python experiments/atlas.py --quick                # the prototype alone, coarse, without what takes long
     python experiments/atlas.py --part turns --robot Go1
 

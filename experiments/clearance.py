@@ -134,9 +134,8 @@ def arm(quick: bool) -> list[dict]:
 
 
 def overhead(quick: bool) -> dict:
-    """Processor time of planning and design with clearance and without, by turns; targets that no program has seen."""
-    count = 4 if quick else 8
-    turns = Rotation.from_quat(np.random.default_rng(1).normal(size=(count + 1, 4))).as_matrix()
+    """Processor time of planning and design with clearance and without, by turns, of second calls: all is compiled."""
+    turns = Rotation.from_quat(np.random.default_rng(1).normal(size=(3 if quick else 8, 4))).as_matrix()
     loops = {name: loop_problem(margin) for name, margin in (("without", None), ("with", MARGIN))}
     work = {
         "plan": lambda turn, margin: reojax.plan(ROBOT, turn, **LIMITS, max_manoeuvres=5, clearance=margin),
@@ -149,10 +148,11 @@ def overhead(quick: bool) -> dict:
     for name, one in work.items():
         seconds: dict = {None: [], MARGIN: []}
         for turn, margin in itertools.product(turns, (None, MARGIN)):
+            one(turn, margin)
             begun = time.process_time()
             one(turn, margin)
             seconds[margin].append(time.process_time() - begun)
-        without, within = (np.array(seconds[margin][1:]) for margin in (None, MARGIN))  # the first ones compile
+        without, within = (np.array(seconds[margin]) for margin in (None, MARGIN))
         answer[name] = {
             "without_s": float(without.sum()),
             "with_s": float(within.sum()),

@@ -6,22 +6,26 @@
 Each run has a random target (Haar) and a prototype whose links' inertias are scaled by exp(0.1 z), z standard normal.
 It runs the word planned for the nominal robot, then up to three corrections. A correction is one new word of up to 5
 manoeuvres to the target, planned at the end of the word before; the last error is of the true orientation.
-The orientation is read after every manoeuvre, 1 degree of noise about each axis. Four ways to correct:
+The orientation is read after every manoeuvre, 1 degree of noise about each axis. Five ways to correct:
 
 - reading: `replan`, nominal robot, from the last reading as it is;
 - orientation: nominal robot, from the orientation estimated from all readings;
 - learning: from that orientation, amplitudes corrected for the estimated robot;
 - every manoeuvre: learning, and after each manoeuvre those left of the word are corrected likewise, the first word's
   too. (A whole new word after each manoeuvre would never end: any small rotation left takes some manoeuvres again.)
+- within the motion: every manoeuvre under the library's `Steering`, which reads the orientation 200 times a second,
+  1 degree of noise, and estimates the inertias; 100 runs.
 
 Expected: one reading alone is off by 2.8 degrees (95th percentile); learning should end below 2.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from common.script import options, run
 from feedback_parts.correcting import LIMITS, LINKS, NOMINAL, SPREAD, Words, along, angle_left, correct, estimate, turns
+from feedback_parts.in_flight import InFlight
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 from tqdm import tqdm
@@ -31,7 +35,9 @@ from reojax.files import check_writable, write_json
 
 CORRECTIONS = 3
 EVERY = "every manoeuvre"
-WAYS = (EVERY, "learning", "orientation", "reading")
+WITHIN = "within the motion"
+WAYS = (EVERY, "learning", "orientation", "reading", WITHIN)
+WITHIN_RUNS = 100
 
 
 def planned(now: np.ndarray, target: np.ndarray, slots: int) -> Words:
@@ -85,7 +91,10 @@ class Flight:
 
 def errors_of(way: str, truth, first: Words, target: np.ndarray, noise: float, corrections: int) -> np.ndarray:
     """Angles to the target (1 + corrections, m) after the first word and after each further one [rad]."""
-    flight, words, errors = Flight(truth, noise), Words(first.last, first.x.copy()), []
+    words, errors = Words(first.last, first.x.copy()), []
+    if way == WITHIN:
+        return _within(truth, words, target, noise, corrections)
+    flight = Flight(truth, noise)
     slots = first.last.shape[1]
     for left in tqdm(range(corrections, -1, -1), desc=way, unit=" words", leave=False):
         if way == EVERY:
@@ -105,7 +114,19 @@ def errors_of(way: str, truth, first: Words, target: np.ndarray, noise: float, c
     return np.array(errors)
 
 
-def main(out: Path, *, quick: bool = False) -> dict:
+def _within(truth, words: Words, target: np.ndarray, noise: float, corrections: int) -> np.ndarray:
+    """`errors_of`, all of it by the library's `Steering`."""
+    flight, errors, slots = InFlight(truth, noise), [], words.last.shape[1]
+    for left in tqdm(range(corrections, -1, -1), desc=WITHIN, unit=" words", leave=False):
+        flight.fly_word(words, target)
+        errors.append(np.linalg.norm(angle_left(flight.now, target), axis=1))
+        if left:
+            z, seen = flight.believed()
+            words = correct(z, planned(seen, target, slots), seen, target)
+    return np.array(errors)
+
+
+def main(out: Path, *, quick: bool = False, ways: Sequence[str] = WAYS) -> dict:
     """Run, print the table, write `feedback.json` and `feedback.png` to `out`, and return the numbers."""
     table, picture = check_writable(out / "feedback.json"), check_writable(out / "feedback.png")
     runs, corrections, slots = (12, 1, 4) if quick else (1_000, CORRECTIONS, 5)
@@ -113,15 +134,23 @@ def main(out: Path, *, quick: bool = False) -> dict:
     target = Rotation.from_quat(rng.normal(size=(runs, 4))).as_matrix()
     truth = rng.normal(size=(runs, LINKS))
     first = planned(np.tile(np.eye(3), (runs, 1, 1)), target, slots)
-    cases = {(way, 1.0): np.empty(0) for way in (WAYS[:1] if quick else WAYS)}
+    cases = {(way, 1.0): np.empty(0) for way in (WAYS[:1] if quick else ways)}
     rows = []
     print("angle to the target [deg], median / 95th percentile: after the first word and 1, 2, 3 more")
     for way, degrees in cases:
-        errors = np.rad2deg(errors_of(way, truth, first, target, np.deg2rad(degrees), corrections))
+        part = slice(WITHIN_RUNS if way == WITHIN else runs)
+        words = Words(*(field[part] for field in first))
+        errors = np.rad2deg(errors_of(way, truth[part], words, target[part], np.deg2rad(degrees), corrections))
         cases[way, degrees] = errors
         middle, most = np.median(errors, axis=1), np.quantile(errors, 0.95, axis=1)
         rows.append(
-            {"way": way, "noise_deg": degrees, "median_deg": middle.tolist(), "percentile_95_deg": most.tolist()}
+            {
+                "way": way,
+                "runs": errors.shape[1],
+                "noise_deg": degrees,
+                "median_deg": middle.tolist(),
+                "percentile_95_deg": most.tolist(),
+            }
         )
         shown = "   ".join(f"{a:6.2f} / {b:6.2f}" for a, b in zip(middle, most, strict=True))
         print(f"{way:15} {shown}", flush=True)
@@ -145,4 +174,6 @@ def _draw(cases: dict, file: Path) -> None:
 
 
 if __name__ == "__main__":
-    run(main, options(__doc__))
+    parser = options(__doc__)
+    parser.add_argument("--ways", nargs="+", choices=WAYS, default=WAYS, help="ways to correct (default: all)")
+    run(main, parser)

@@ -1,11 +1,13 @@
 """How surely, how fast and how exactly does `righting` turn a falling robot that already spins?
 
-    python experiments/righting.py            # many minutes
+    python experiments/righting.py            # goes on where it was stopped; hours for all 500 of the quadruped
     python experiments/righting.py --quick    # the prototype alone, few releases
 
-Random targets (Haar for the prototype; for the quadruped, whose legs turn it less, within 0.5 rad of where it would
-drift) and momenta up to half a turn in the fall of 0.62 s. The answers are integrated again, by MuJoCo's momentum
-matrices where MuJoCo is installed.
+Random releases: any orientation (Haar), momenta that turn the straight robot by up to half a turn in the fall of
+0.62 s, about any axis. The prototype has to end in a given orientation, the quadruped with its feet down: its own yaw
+is free, so that the one nearest to where it would drift is taken, and half a turn from there where that fails. Both
+have their motors: the prototype's RE-max 17 at 12 V, the quadruped's brushless ones (chosen numbers, see `MOTORS`).
+The answers are replayed by MuJoCo's full dynamics where MuJoCo is installed (`righting_parts/dynamics.py`).
 """
 
 import importlib.util
@@ -18,71 +20,109 @@ from common.script import options, run
 from scipy.spatial.transform import Rotation
 
 import reojax
-from reojax import interop, robots, so3
+from reojax import robots, so3
 from reojax.files import check_writable, write_json
 
 FALL = 0.62
+MOTORS = {
+    "prototype": reojax.RE_MAX_17,
+    # Solo12: 9:1 belts, 24 V; 300 rpm/V is k = 0.0318 V s/rad, and 0.25 ohm with it some 2.7 N m at the joint at 9.4 A
+    "quadruped": reojax.Motor(
+        supply=24.0, resistance=0.25, torque_constant=0.0318, rotor_inertia=4e-6, gear_ratio=9.0, efficiency=0.95,
+        efficiency_back=0.95,
+    ),
+}  # fmt: skip
+CHUNK = 10
 
 
 def main(out: Path, *, quick: bool = False) -> dict:
     """Run, print the table, write `righting.json` to `out`, and return the numbers."""
     file = check_writable(out / "righting.json")
-    sizes = {"prototype": 10} if quick else {"prototype": 200, "quadruped": 24}
+    sizes = {"prototype": 6} if quick else {"prototype": 500, "quadruped": 500}
     result = {}
     for name, releases in sizes.items():
-        result[name] = _releases(robots.by_name(name), releases, near=name == "quadruped")
+        result[name] = _releases(out / "righting_parts", name, releases, file, result)
         print(name, result[name], flush=True)
-        write_json(file, result)
+    write_json(file, result)
     return result
 
 
-def _releases(robot: reojax.Robot, releases: int, *, near: bool) -> dict:
+def _releases(folder: Path, name: str, releases: int, file: Path, before: dict) -> dict:
+    """All releases of one robot, ten at a time; what is done is kept, and the table is written anew after each ten."""
+    robot = robots.by_name(name)
     rng = np.random.default_rng(0)
     inertia = np.asarray(reojax.momentum_matrices(robot, np.zeros(robot.joints)).A)
     axis = rng.normal(size=(releases, 3))
     turn = rng.uniform(0, np.pi, (releases, 1)) * axis / np.linalg.norm(axis, axis=1, keepdims=True)
-    momenta = turn / FALL @ inertia
-    target = Rotation.from_quat(rng.normal(size=(releases, 4)))
-    if near:
-        aside = rng.normal(size=(releases, 3))
-        aside *= rng.uniform(0, 0.5, (releases, 1)) / np.linalg.norm(aside, axis=1, keepdims=True)
-        target = Rotation.from_rotvec(turn) * Rotation.from_rotvec(aside)
-    reojax.righting(robot, target[0].as_matrix(), momentum=momenta[0], duration=FALL)
-    found, seconds = [], []
-    for goal, momentum in zip(target.as_matrix(), momenta, strict=True):
-        begin = time.process_time()
-        found.append(reojax.righting(robot, goal, momentum=momentum, duration=FALL))
-        seconds.append(time.process_time() - begin)
-    good = [one for one in found if one.converged]
-    replayed = [_replayed(robot, one) for one in good[:10]] if importlib.util.find_spec("mujoco") else []
+    released = Rotation.from_quat(rng.normal(size=(releases, 4))).inv()  # upright, seen from where it is let go
+    targets = _feet_down(released, turn) if name == "quadruped" else released.as_matrix()[:, None]
+    folder.mkdir(parents=True, exist_ok=True)
+    rows: list[np.ndarray] = []
+    row = {}
+    for first in range(0, releases, CHUNK):
+        part = folder / f"{name}-{first}-{min(CHUNK, releases - first)}.npy"
+        if not part.exists():
+            take = range(first, min(first + CHUNK, releases))
+            np.save(part, [_one(robot, name, targets[k], turn[k] / FALL @ inertia) for k in take])
+        rows.append(np.load(part))
+        row = _summary(np.concatenate(rows))
+        write_json(file, before | {name: row})
+    return row
+
+
+def _feet_down(released: Rotation, turn: np.ndarray) -> np.ndarray:
+    """Upright ends (m, 2, 3, 3): by the least turn from where it would drift, and half a yaw from there."""
+    drift = Rotation.from_rotvec(turn).as_matrix()
+    up = released.as_matrix()[:, :, 2]  # world's up, in the frame of the release
+    now = drift[:, :, 2]
+    cross = np.cross(now, up)
+    angle = np.arctan2(np.linalg.norm(cross, axis=1), (now * up).sum(1))
+    least = Rotation.from_rotvec(cross / np.linalg.norm(cross, axis=1, keepdims=True) * angle[:, None]).as_matrix()
+    return np.stack([least @ drift, least @ drift @ np.diag([-1.0, -1.0, 1.0])], axis=1)
+
+
+def _one(robot: reojax.Robot, name: str, targets: np.ndarray, momentum: np.ndarray) -> tuple[float, ...]:
+    """Reached, error, margin, travel, processor time, angle of the replay, angle asked for."""
+    begin = time.process_time()
+    pieces = 8 if name == "quadruped" else None
+    options = {"momentum": momentum, "duration": FALL, "motors": MOTORS[name], "pieces": pieces, "starts": 6}
+    found = reojax.righting(robot, targets[0], **options, shorten=False)
+    if not found.converged and len(targets) > 1:
+        found = reojax.righting(robot, targets[1], **options, shorten=False)
+    seconds = time.process_time() - begin
+    replayed = np.nan
+    if found.converged and importlib.util.find_spec("mujoco"):
+        from righting_parts.dynamics import replay
+
+        replayed = float(so3.angle(jnp.asarray(replay(robot, found).T @ found.rotation)))
+    inertia = np.asarray(reojax.momentum_matrices(robot, np.zeros(robot.joints)).A)
+    drifted = Rotation.from_rotvec(np.linalg.solve(inertia, momentum) * FALL).as_matrix()
+    asked = float(so3.angle(jnp.asarray(drifted.T @ targets[0])))
+    known = (found.converged, found.error, found.margin, found.travel)
+    return *(float(x) for x in known), seconds, replayed, asked
+
+
+def _summary(rows: np.ndarray) -> dict:
+    good = rows[:, 0] == 1
+    reached = rows[good]
+    some = len(reached) > 0
+    by_angle = {}
+    for low, high in ((0, 45), (45, 90), (90, 135), (135, 180)):
+        inside = (np.rad2deg(rows[:, 6]) >= low) & (np.rad2deg(rows[:, 6]) < high + (high == 180))
+        by_angle[f"{low} to {high} deg"] = f"{int((inside & good).sum())} of {int(inside.sum())}"
     return {
-        "releases": releases,
-        "reached": len(good),
-        "largest_error_rad": float(max((one.error for one in good), default=np.nan)),
-        "travel_median_rad": float(np.median([one.travel for one in good])) if good else None,
-        "processor_s_median": float(np.median(seconds)),
-        "processor_s_percentile_95": float(np.quantile(seconds, 0.95)),
-        "replayed": len(replayed),
-        "replay_largest_rad": float(max(replayed)) if replayed else None,
+        "releases": len(rows),
+        "reached": int(good.sum()),
+        "largest_error_rad": float(reached[:, 1].max()) if some else None,
+        "motor_margin_median": float(np.median(reached[:, 2])) if some else None,
+        "motor_margin_least": float(reached[:, 2].min()) if some else None,
+        "travel_median_rad": float(np.median(reached[:, 3])) if some else None,
+        "processor_s_median": float(np.median(rows[:, 4])),
+        "processor_s_percentile_95": float(np.quantile(rows[:, 4], 0.95)),
+        "replayed": int(np.isfinite(rows[:, 5]).sum()),
+        "replay_largest_rad": float(np.nanmax(rows[:, 5])) if np.isfinite(rows[:, 5]).any() else None,
+        "reached_by_angle_asked": by_angle,
     }
-
-
-def _replayed(robot: reojax.Robot, found: reojax.Righting, steps: int = 500) -> float:
-    """Angle to the answer's end by MuJoCo's momentum matrices and the midpoint rule."""
-    foreign, trajectory = interop.mujoco_model(robot), found.trajectory
-    rotation, eye, h = np.eye(3), np.eye(3), FALL / steps
-    for k in range(steps):
-        state = trajectory.at((k + 0.5) * h)
-        matrix = interop.mujoco_momentum(foreign, np.asarray(state.theta), np.zeros(3), eye)
-        inertia, coupling, _ = interop.split(matrix, eye)
-        own = coupling @ np.asarray(state.theta_dot)
-        half = rotation @ _turn(h / 2 * np.linalg.solve(inertia, own + rotation.T @ found.momentum))
-        rotation = rotation @ _turn(h * np.linalg.solve(inertia, own + half.T @ found.momentum))
-    return float(so3.angle(jnp.asarray(rotation.T @ found.rotation)))
-
-
-def _turn(vector: np.ndarray) -> np.ndarray:
-    return Rotation.from_rotvec(vector).as_matrix()
 
 
 if __name__ == "__main__":

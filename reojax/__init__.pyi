@@ -46,7 +46,9 @@ from reojax.planning.result import Plan
 from reojax.robot import Robot, layout_of, make_robot
 from reojax.session import CompilationCache, cache
 from reojax.steering.feedback import Steering as Steering
+from reojax.steering.for_all import RightingForAll as RightingForAll, righting_for_all as righting_for_all
 from reojax.steering.gains import CorrectionGains as CorrectionGains, correction_gains as correction_gains
+from reojax.steering.lookup import RightingTable as RightingTable, righting_table as righting_table
 from reojax.steering.readings import Reading as Reading, References as References
 from reojax.steering.result import Righting as Righting
 from reojax.steering.righting import righting as righting, righting_many as righting_many
@@ -143,7 +145,11 @@ __all__ = [
     "replan",
     "righting",
     "Righting",
+    "RightingTable",
+    "RightingForAll",
+    "righting_for_all",
     "righting_many",
+    "righting_table",
     "Robot",
     "robots",
     "rotation_history",

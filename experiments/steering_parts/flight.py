@@ -11,7 +11,7 @@ from common.types import Array
 
 import reojax
 from reojax import so3
-from reojax.steering.feedback import SteeringLaw
+from reojax.steering.law import SteeringLaw
 from reojax.steering.readings import Reading
 
 TICK = 2e-3

@@ -186,3 +186,12 @@ def refuse(
         where = ", ".join(map(str, index))
         called = f" ({names[index[0]]})" if names else ""
         raise ValueError(f"{entry}[{where}]{called} is {array[index].tolist()}{unit}; {rule}.")
+
+
+def no_momentum(momentum: Any, what: str) -> None:
+    """Refuse an angular momentum where turns are thought of as those of a path alone."""
+    if momentum is not None and np.any(np.asarray(momentum) != 0):
+        raise ValueError(
+            f"`momentum` is {shorten(momentum)}; `{what}` is for zero angular momentum, where only the path counts. "
+            "For a robot that already spins there is `reojax.righting`."
+        )

@@ -44,6 +44,8 @@ class Parameter(NamedTuple):
 def parameter(robot: Robot, name: str) -> Parameter:
     """Return the parameter of a name: "end_inertia", "rotor_inertia", "gear_ratio" or an entry, "com[0,2]".
 
+    "inertia_scale[1]" is a factor of all of link 1's inertia, 1 at the start.
+
     Raises:
         ValueError: saying what there is, for any other name.
     """
@@ -53,10 +55,13 @@ def parameter(robot: Robot, name: str) -> Parameter:
     if text in ("rotor_inertia", "gear_ratio"):
         return _common(robot, text)
     match = _ENTRY.match(text)
+    if match is not None and match[1] == "inertia_scale":
+        return _inertia_scale(robot, text, match[2])
     if match is None or match[1] not in UNITS:
         fields = ", ".join(UNITS)
         raise ValueError(
-            f"there is no parameter {name!r}; there are end_inertia, rotor_inertia, gear_ratio, and entries such as "
+            f"there is no parameter {name!r}; there are end_inertia, rotor_inertia, gear_ratio, "
+            f"inertia_scale[0] and entries such as "
             f"mass[1] or com[0,2] of the fields {fields}." + did_you_mean(text, ("end_inertia", *UNITS))
         )
     return _entry(robot, text, match[1], tuple(int(index) for index in match[2].split(",")))
@@ -95,6 +100,17 @@ def _entry(robot: Robot, name: str, field: str, index: tuple[int, ...]) -> Param
     diagonal = field == "inertia" and index[1] == index[2]
     positive = start > 0 and (field in ("mass", "rotor_inertia") or diagonal)
     return Parameter(name, start, _set_entry(field, index), UNITS[field], size or 1.0, positive)
+
+
+def _inertia_scale(robot: Robot, name: str, index: str) -> Parameter:
+    if not index.isdigit() or int(index) >= robot.links:
+        raise ValueError(f"there is no {name} on {robot.name!r}, which has {robot.links} links; say inertia_scale[0].")
+    return Parameter(name, 1.0, _scale_inertia(int(index)), "", 0.1, True)
+
+
+@lru_cache(maxsize=256)
+def _scale_inertia(link: int) -> Put:
+    return lambda robot, value: robot.replace(inertia=jnp.asarray(robot.inertia).at[link].multiply(value))
 
 
 @lru_cache(maxsize=256)

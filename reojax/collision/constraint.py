@@ -27,8 +27,9 @@ _ROUND = 0.001
 margin that rest barely has can be kept."""
 _SHARE = 0.5
 """Share of what a pair has beyond the margin that is asked of it at most; rounding off takes some of the rest."""
-_REFINED = 2
-"""How often the nearest place of an edge is made more exact by a parabola."""
+_LONG, _REFINED = 4, 2
+"""Samples of an edge from which its nearest place is made more exact by a parabola, and how often; edges of a curve are
+short enough without."""
 _SAMPLES = 96
 """Samples of a path by default, one an edge at least."""
 _GROUPS = 12
@@ -150,7 +151,7 @@ def _closest(
     flat = gap.reshape(edges, -1).argmin(1)
     pair, nearest = flat // (samples + 1), flat % (samples + 1)
     place = nearest.astype(start.dtype)
-    if samples > 1:
+    if samples >= _LONG:
         edge, step = np.arange(edges), 1.0
         middle = jnp.clip(place, 1, samples - 1)
         around = [gap[edge, pair, jnp.clip(nearest, 1, samples - 1) + by] for by in (-1, 0, 1)]

@@ -1,5 +1,6 @@
 """Design by gradients: pose a problem over a robot and its loop, solve it, and say how certain the answer is."""
 
+from reojax.design.authority import authority as authority, authority_above as authority_above
 from reojax.design.link_edits import (
     with_com_offset as with_com_offset,
     with_joint_inertia as with_joint_inertia,

@@ -114,6 +114,7 @@ class Problem:
         equality: Sequence[Measure] = (),
         inequality: Sequence[Measure] = (),
         steps: int = DEFAULT_STEPS,
+        momentum: ArrayLike | None = None,
     ) -> None:
         """Pose the problem.
 
@@ -124,10 +125,12 @@ class Problem:
             equality: measures that must be 0.
             inequality: measures that must not be positive.
             steps: steps per edge of `net_rotation`; 1 serves sampled curves.
+            momentum: none, or zero: any other is refused, and `reojax.righting` named.
 
         Raises:
             ValueError: for bad variables, see `Space`.
         """
+        checks.no_momentum(momentum, "design.Problem")
         for entry, function in (("build", build), ("objective", objective)):
             if not callable(function):
                 raise ValueError(f"`{entry}` is {checks.shorten(function)}; it must be a function.")

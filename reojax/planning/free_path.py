@@ -103,6 +103,7 @@ def free_path(
     max_steps: int = 100,
     seed: int = 0,
     progress: bool | str = False,
+    momentum: ArrayLike | None = None,
 ) -> FreePaths:
     """Find a joint path of little travel after which the base has turned by `target` (3, 3); any tree robot.
 
@@ -110,6 +111,7 @@ def free_path(
 
     `free_paths` for one target: arguments and errors are explained there.
     """
+    checks.no_momentum(momentum, "free_path")
     many = free_paths(
         robot,
         checks.rotations("target", target, (3, 3))[None],
@@ -155,6 +157,7 @@ def free_paths(
     max_steps: int = 100,
     seed: int = 0,
     progress: bool | str = False,
+    momentum: ArrayLike | None = None,
 ) -> FreePaths:
     """Find joint paths of little travel after which the base has turned by the targets; any tree robot.
 
@@ -287,6 +290,7 @@ def _clear_again(search: Search, x: np.ndarray, runs: np.ndarray, targets: np.nd
     """Solve again what came too near between the samples, with more clearance asked for at them; changes `x`."""
     if search.clear is None:
         return
+    search.rounds = 1  # from where they are
     for _ in range(_AGAIN):
         near = moving[~search.clear.kept(search.polygons.paths(x[moving], search.freedom))]
         if not len(near):

@@ -67,6 +67,7 @@ class Search:
         self.polygons, self.table, self.freedom = polygons, table, freedom
         self.clear, self.spare = clear, 0.0 if clear is None else _SPARE * clear.margin
         self.starts, self.max_steps, self.tolerance = starts, max_steps, tolerance
+        self.rounds = _ROUNDS
         corners = polygons.corners
         self._low = np.append(np.tile(freedom.low, corners), 0.0)
         self._high = np.append(np.tile(freedom.high, corners), 0.0)
@@ -178,7 +179,7 @@ class Search:
 
     def _starts(self, target: np.ndarray) -> np.ndarray:
         """Random polygons (s, n) near a target, clear ones where that is asked, as far as there are enough."""
-        count = _ROUNDS * self.starts
+        count = self.rounds * self.starts
         if self._clear_rows is None:
             return self.table.near(target, count)
         x = self.table.near_among(self._clear_rows, target, count)

@@ -56,6 +56,7 @@ def plan(
     layout: Layout | None = None,
     clearance: float | None = None,
     tolerance: float = 1e-9,
+    momentum: ArrayLike | None = None,
 ) -> Plan:
     """Find a sequence of manoeuvres within joint limits after which the base has turned by `target`.
 
@@ -74,6 +75,7 @@ def plan(
         clearance: least distance between the robot's parts, from 0 up, that is proven to be kept along the whole path
             [m]; default not asked. Where some loops would come nearer, others are used.
         tolerance: angle to the target that counts as reached [rad].
+        momentum: none, or zero: any other is refused, and `reojax.righting` named.
 
     Returns:
         The plan. If the target is not reached, the closest plan found, with `converged` False and the reason in
@@ -82,6 +84,7 @@ def plan(
     Raises:
         ValueError: naming the entry, if the target is no rotation or an option makes no sense.
     """
+    checks.no_momentum(momentum, "plan")
     targets = checks.rotations("target", target, (3, 3))[None]
     limits = {"twist_limit": twist_limit, "bend_limit": bend_limit, "max_manoeuvres": max_manoeuvres}
     choices = {"objective": objective, "vocabulary": vocabulary, "layout": layout, "tolerance": tolerance}
@@ -102,11 +105,13 @@ def plan_many(
     clearance: float | None = None,
     tolerance: float = 1e-9,
     progress: bool | str = False,
+    momentum: ArrayLike | None = None,
 ) -> Plan:
     """Plan for many targets (m, 3, 3): `plan` with a leading axis m on every field of the answer.
 
     Runs on the host in batches; with `progress`, a bar on stderr counts the targets.
     """
+    checks.no_momentum(momentum, "plan_many")
     targets = checks.rotations("targets", targets, (-1, 3, 3))
     limits = {"twist_limit": twist_limit, "bend_limit": bend_limit, "max_manoeuvres": max_manoeuvres}
     choices = {"objective": objective, "vocabulary": vocabulary, "layout": layout, "tolerance": tolerance}

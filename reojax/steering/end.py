@@ -7,7 +7,7 @@ variation (`reojax.mechanics.variation`): one sum over the nodes, however many p
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import jax
@@ -20,7 +20,7 @@ from reojax._internal.arrays import Array
 from reojax._internal.linalg import solve_symmetric3
 from reojax.mechanics.integrators import orientations, step_nodes
 from reojax.mechanics.momentum import momentum_matrices
-from reojax.mechanics.variation import turn_per_change
+from reojax.mechanics.variation import Instant, instant, turn_of_instant
 from reojax.robot import Robot
 
 
@@ -116,17 +116,44 @@ def end_and_slope(
     """
     own = basis(points.shape[0] - 1, steps)
     dtype = points.dtype
-    rotation = end_of(robot, points, duration, momentum, steps)
+    theta = jnp.asarray(own.nodes[:, 0], dtype) @ points
+    rate = jnp.asarray(own.nodes[:, 1], dtype) @ points / duration
+    known = jax.vmap(partial(instant, robot))(theta, rate)
+    rotation = _by_nodes(known, rate, duration / (own.nodes.shape[0] // 2), momentum)
     half = jax.vmap(lambda a, b: a @ so3.exp(0.5 * so3.log(a.T @ b)))(rotation[:-1], rotation[1:])
     pairs = jnp.concatenate([half, rotation[1:]], axis=1).reshape(-1, 3, 3)
     both = jnp.concatenate([rotation[:1], pairs])
-    theta = jnp.asarray(own.nodes[:, 0], dtype) @ points
-    rate = jnp.asarray(own.nodes[:, 1], dtype) @ points / duration
-    g, growth = jax.vmap(turn_per_change, (None, 0, 0, 0, None))(robot, theta, rate, both, momentum)
+    g, growth = jax.vmap(partial(turn_of_instant, robot), (0, 0, 0, None))(known, rate, both, momentum)
     to_end = _transitions(growth, duration)
     weight = jnp.asarray(own.weights, dtype)[:, None, None] * duration
     slope = jnp.einsum("nai,np->api", weight * (to_end @ g), jnp.asarray(own.nodes[:, 0], dtype))
     return rotation, slope
+
+
+def _by_nodes(known: Instant, rate: Float[Array, "n j"], length: Array, momentum: Array) -> Float[Array, "s+1 3 3"]:
+    """Orientation at the ends of all steps, Runge-Kutta of fourth order on the nodes where the slope is known too."""
+    eye = jnp.eye(3, dtype=rate.dtype)
+
+    def turning(A: Array, B: Array, rate: Array) -> Array:
+        return solve_symmetric3(A, jnp.concatenate([(B @ rate)[:, None], eye], axis=1))
+
+    both = jax.vmap(turning)(known.A, known.B, rate)
+    nodes = jnp.stack([both[:-1:2], both[1::2], both[2::2]], axis=1)
+
+    def step(r: Array, node: Array) -> tuple[Array, Array]:
+        def omega(k: int, r: Array) -> Array:
+            return node[k, :, 0] + node[k, :, 1:] @ (r.T @ momentum)
+
+        first = omega(0, r)
+        second = omega(1, r @ so3.exp(length / 2 * first))
+        third = omega(1, r @ so3.exp(length / 2 * second))
+        last = omega(2, r @ so3.exp(length * third))
+        turn = length / 6 * (first + 2 * second + 2 * third + last) + length**2 / 12 * jnp.cross(first, last)
+        after = r @ so3.exp(turn)
+        return after, after
+
+    _, found = jax.lax.scan(step, eye, nodes)
+    return jnp.concatenate([eye[None], found])
 
 
 def _transitions(growth: Float[Array, "m 3 3"], duration: Array) -> Float[Array, "m 3 3"]:

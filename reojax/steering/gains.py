@@ -71,6 +71,8 @@ class CorrectionGains(NamedTuple):
     """What an error here is at the end, if nothing is done: the identity unless there is angular momentum."""
     rest: Float[Array, ""]
     """What the law adds to the Gramian's diagonal, so that gains stay finite at the end, where nothing can be done."""
+    momentum: Float[Array, "3"]
+    """Angular momentum that they are made for, inertial frame [kg m^2/s]."""
 
     def change(self, start: int, error: ArrayLike) -> Float[Array, "m j"]:
         """Least change of the joints from sample `start` on that takes back an error known there, and only there.
@@ -200,6 +202,7 @@ def _gains(
         gramian=gramian,
         to_end=to_end,
         rest=rest,
+        momentum=nodes.momentum,
     )
 
 

@@ -27,13 +27,15 @@ class Task(NamedTuple):
     robot: Robot
     motors: Motor | None
     clearance: Array | None
+    spare: Array
+    """Clearance that a search keeps beyond it at the nodes, for what lies between them [m]."""
     start: Array
     end: Array
     weights: Array
 
 
-def bounds(task: Task) -> tuple[Float[Array, " c"], Float[Array, " c"]]:
-    """Lowest and highest value of each condition of `conditions`."""
+def bounds(task: Task, spare: bool = False) -> tuple[Float[Array, " c"], Float[Array, " c"]]:
+    """Lowest and highest value of each condition of `conditions`; with the spare clearance, as a search has it."""
     robot = task.robot
     dtype = robot.mass.dtype
     pairs: list[tuple[Any, Any]] = [(robot.lower, robot.upper)]
@@ -41,7 +43,7 @@ def bounds(task: Task) -> tuple[Float[Array, " c"], Float[Array, " c"]]:
         pairs.append((-jnp.ones(robot.joints, dtype), jnp.ones(robot.joints, dtype)))
     if task.clearance is not None:
         count = len(robot.collision_pairs)
-        pairs.append((jnp.full(count, task.clearance), jnp.full(count, jnp.inf)))
+        pairs.append((jnp.full(count, task.clearance + (task.spare if spare else 0)), jnp.full(count, jnp.inf)))
     low, high = (jnp.concatenate(side) for side in zip(*pairs, strict=True))
     return low, high
 

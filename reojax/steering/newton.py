@@ -79,7 +79,7 @@ def _solve_one(task: Task, pieces: int, max_steps: int, points, goal, momentum, 
     variables, x = free_points(robot, points)
     rows = rows_at_steps(pieces, STEPS, duration, dtype)
     lift = variables.slopes(rows)
-    low, high = (side[None] for side in bounds(task))
+    low, high = (side[None] for side in bounds(task, spare=True))
     form, carried = effort_form(pieces), task.weights[:, None] * variables.carry
     hessian = jnp.kron(jnp.asarray(form[1:-1, 1:-1], dtype), variables.carry.T @ carried)
     hessian = hessian + 1e-6 * jnp.eye(x.size, dtype=dtype)
@@ -133,7 +133,7 @@ def _solve_one(task: Task, pieces: int, max_steps: int, points, goal, momentum, 
         s = jax.lax.while_loop(going, lambda s: step(s, aim), s)
         points = variables.of(s.x)
         true = end_of(robot, points, duration, momentum, EXACT_STEPS)[-1]
-        here = end_of(robot, points, duration, momentum, STEPS)[-1]
+        here = end_and_slope(robot, points, duration, momentum, STEPS)[0][-1]
         more = jnp.maximum(s.steps - _LAST // 2, 0)
         return s._replace(miss=huge, settled=~no, steps=more), here @ true.T @ goal
 

@@ -72,7 +72,7 @@ class Law:
             before = np.array([np.interp(seen[1], state.past[:, 0], column) for column in state.past[:, 1:].T])
             own = then["rotation"] @ exp(then["connection"] @ (-then["direction"] @ before))
             since = (then["gramian"] - now["gramian"]) @ (before + filtered) / 2
-            error, worth = log(seen[0] @ own.T) - since, 1 - np.exp(-(seen[1] - read) / self.settle)
+            error, worth = then["to_end"] @ log(seen[0] @ own.T) - since, 1 - np.exp(-(seen[1] - read) / self.settle)
             later, read = self.table["direction"][self.table["at"] >= time], seen[1]
             steer = corrected(now, later, steer, filtered, rate, error, worth, self.tau, self.largest)
         filtered, rate = smooth(steer, filtered, rate, time - state.time, self.tau)
@@ -112,8 +112,8 @@ def at(table: Mapping[str, np.ndarray], time: float) -> dict[str, np.ndarray]:
     pair = np.stack([q[k], q[k + 1]]) * [[1.0], [1.0 if q[k] @ q[k + 1] >= 0 else -1.0]]
     spin[1] = spin[1] * (1.0 if q[k] @ q[k + 1] >= 0 else -1.0)
     turned = (1 - a) * pair[0] + a * pair[1] + h * b * ((1 - u) * spin[0] - u * spin[1])
-    lines = ("connection", "direction", "gramian", "rest")
-    found = {name: (1 - u) * table[name][k] + u * table[name][k + 1] for name in lines}
+    lines = ("connection", "direction", "gramian", "rest", *(["to_end"] if "to_end" in table else []))
+    found = {"to_end": np.eye(3)} | {name: (1 - u) * table[name][k] + u * table[name][k + 1] for name in lines}
     found["density"] = (table["gramian"][k] - table["gramian"][k + 1]) / h
     return found | {"theta": cubic(table["theta"], table["theta_dot"]), "rotation": matrix(turned)}
 
@@ -128,6 +128,7 @@ def read(path: str | Path) -> dict[str, np.ndarray]:
     joints = sum(name.startswith("theta_dot") for name in names)
     shapes = {"at": (), "theta": (joints,), "theta_dot": (joints,), "quaternion": (4,), "omega": (3,)}
     shapes |= {"connection": (3, joints), "direction": (joints, 3), "gramian": (3, 3), "rest": ()}
+    shapes |= {"momentum": (3,)} | ({"to_end": (3, 3)} if "to_end_0_0" in names else {})
     table, column = {}, 0
     for name, shape in shapes.items():
         width = int(np.prod(shape, dtype=int))

@@ -40,6 +40,25 @@ class References(NamedTuple):
     """What the change under way does not take back of it [rad]."""
 
 
+class Believed(NamedTuple):
+    """What `Steering` knows of the flight, in the inertial frame of its first motion."""
+
+    robot: Robot
+    """With the estimated parameters."""
+    taken: Float[Array, ""]
+    """When the last orientation was taken [s]."""
+    rotation: Float[Array, "3 3"]
+    """Orientation then."""
+    momentum: Float[Array, "3"]
+    """Angular momentum [kg m^2/s]."""
+    drag: Float[Array, ""]
+    """Of the wires [N m s/rad]."""
+    values: Float[Array, " q"]
+    """Of the parameters."""
+    covariance: Float[Array, "7+q 7+q"]
+    """Of all of these, in the frame of the motion under way."""
+
+
 class SteeringState(NamedTuple):
     """All that `Steering` remembers."""
 

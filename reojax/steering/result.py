@@ -44,6 +44,9 @@ class Righting(NamedTuple):
     least_duration: Float[np.ndarray, "*m"]
     """Shortest duration that was found to do, where `duration` would not or none was given; else NaN [s]."""
 
+    clearance: Float[np.ndarray, "*m"]
+    """Distance that no collision pair comes nearer than anywhere along the motion, proven [m]; NaN if not asked for."""
+
     @property
     def value(self) -> Float[np.ndarray, "*m p+1 j"]:
         """The points, under the name that all solvers' results have."""
@@ -69,8 +72,13 @@ class Righting(NamedTuple):
         """The motion of one release, for `simulate`, `track` and `Steering`."""
         if self.points.ndim != 2:
             raise ValueError("`trajectory` is of one release; take one by `Righting(*(field[i] for field in many))`.")
-        own = basis(self.points.shape[0] - 1, 1)
-        pieces = own.coefficients.shape[0]
-        powers = (1 / float(self.duration)) ** np.arange(6)
-        coefficients = np.einsum("qkp,pj->qkj", own.coefficients, self.points) * powers[None, :, None]
-        return Trajectory(float(self.duration) * np.arange(pieces + 1) / pieces, coefficients)
+        return trajectory_through(self.points, float(self.duration))
+
+
+def trajectory_through(points: Float[np.ndarray, "p+1 j"], duration: float) -> Trajectory:
+    """The spline of least jerk through points at equal times, at rest at both ends."""
+    own = basis(len(points) - 1, 1)
+    pieces = len(own.coefficients)
+    powers = (1 / duration) ** np.arange(6)
+    coefficients = np.einsum("qkp,pj->qkj", own.coefficients, points) * powers[None, :, None]
+    return Trajectory(duration * np.arange(pieces + 1) / pieces, coefficients)

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.precision import in_double
+from reojax.collision.clearance import clearance as clearances
 from reojax.mechanics.dynamics import joint_inertia
 from reojax.mechanics.own_units import without_names
 from reojax.motion.motor import Motor, check_motors, per_joint
@@ -27,6 +28,8 @@ from reojax.steering.limits import Task
 from reojax.steering.result import Righting
 from reojax.steering.search import least_durations, search
 
+_SPARE = 1e-3
+"""Clearance that is kept at the nodes beyond what is asked, for what lies between them [m]."""
 PIECES, FEW_PIECES, MANY_JOINTS = 7, 4, 6
 """Pieces of the spline, and of that of a robot of so many joints or more, which has more ways to turn."""
 
@@ -48,6 +51,7 @@ def righting(
     tolerance: float = 1e-6,
     max_steps: int = 40,
     seed: int = 0,
+    shorten: bool = True,
 ) -> Righting:
     """Find a joint motion after which a robot with angular momentum has the target orientation and posture.
 
@@ -59,13 +63,14 @@ def righting(
         start: (j,) posture at the start [rad]; default zero.
         end: (j,) posture at the end; default `start`. The joints are at rest at both.
         motors: whose torque-speed lines must hold, as for `simulate`; default none.
-        clearance: least distance of the robot's collision pairs at the nodes of the motion [m]; default not asked.
+        clearance: least distance of the robot's collision pairs, proven along the whole motion [m]; default not asked.
         weights: (j,) price of each joint's mean square acceleration; default the square of its inertia at the start.
         pieces: pieces of the spline, at least 3; default 7, and 4 from six joints on.
         starts: motions to start from, at most.
         tolerance: angle to the target that counts as reached [rad].
         max_steps: Newton steps from each start, at most.
         seed: of the random motions among which starts are looked for.
+        shorten: whether to look for `least_duration` where the motors cannot do it, which takes many searches.
 
     Returns:
         The motion of least effort of those that converged first; where none did, the best, with `converged` False, and
@@ -76,8 +81,9 @@ def righting(
             beyond reason, which is likely in another unit.
     """
     goal = checks.rotations("target", target)
-    many = _righting(robot, goal[None], np.asarray(momentum)[None] if np.ndim(momentum) == 1 else momentum, duration,
-                     start, end, motors, clearance, weights, pieces, starts, tolerance, max_steps, seed)  # fmt: skip
+    momenta = np.asarray(momentum)[None] if np.ndim(momentum) == 1 else momentum
+    many = _righting(robot, goal[None], momenta, duration, start, end, motors, clearance, weights, pieces, starts,
+                     tolerance, max_steps, seed, shorten)  # fmt: skip
     return Righting(*(field[0] for field in many))
 
 
@@ -98,6 +104,7 @@ def righting_many(
     tolerance: float = 1e-6,
     max_steps: int = 40,
     seed: int = 0,
+    shorten: bool = True,
 ) -> Righting:
     """`righting` for many releases side by side: `targets` (m, 3, 3) or one for all, `momenta` (m, 3).
 
@@ -109,28 +116,39 @@ def righting_many(
         goals = np.broadcast_to(goals, (len(np.atleast_2d(given)), 3, 3))
     goals = checks.rotations("targets", goals, (-1, 3, 3))
     return _righting(robot, goals, given, duration, start, end, motors, clearance, weights, pieces, starts, tolerance,
-                     max_steps, seed)  # fmt: skip
+                     max_steps, seed, shorten)  # fmt: skip
 
 
 def _righting(robot, goals, momenta, duration, start, end, motors, clearance, weights, pieces, starts, tolerance,
-              max_steps, seed) -> Righting:  # fmt: skip
+              max_steps, seed, shorten) -> Righting:  # fmt: skip
     """Check everything, search, and where the motors cannot do it, look for the least duration."""
-    checks.instance("robot", robot, Robot, "`make_robot` makes")
-    checks.on_host("robot", robot, "righting")
-    if pieces is None:
-        pieces = PIECES if robot.joints < MANY_JOINTS else FEW_PIECES
-    pieces, starts = checks.whole("pieces", pieces, 3), checks.whole("starts", starts)
+    starts = checks.whole("starts", starts)
     tolerance, max_steps = checks.positive("tolerance", tolerance), checks.whole("max_steps", max_steps)
     seed = checks.whole("seed", seed, 0)
-    first = posture(robot, "start", np.zeros(robot.joints) if start is None else start)
-    last = first if end is None else posture(robot, "end", end)
     if duration is None and motors is None:
         raise ValueError("`duration` is None, the shortest that is found; without `motors` there is none.")
     seconds = 0.5 if duration is None else checks.positive("duration", duration, "s")
     h = np.asarray(checks.numbers("momentum", momenta, (-1, 3)))
     if len(h) != len(goals):
         raise ValueError(f"`momenta` has {len(h)} rows for {len(goals)} targets.")
-    reasonable(robot, first, h, seconds)
+    task, pieces = task_of(robot, h, seconds, start, end, motors, clearance, weights, pieces)
+    look = partial(search, task, pieces=pieces, starts=starts, tolerance=tolerance, max_steps=max_steps, seed=seed)
+    found = look(goals, h, np.full(len(h), seconds))
+    if duration is not None and (motors is None or not shorten or found.converged.all()):
+        return found
+    return least_durations(look, found, goals, h, keep=duration is not None)
+
+
+def task_of(robot, momenta, seconds, start, end, motors, clearance, weights, pieces) -> tuple[Task, int]:
+    """What all motions of a search share, checked, and the pieces of their splines."""
+    checks.instance("robot", robot, Robot, "`make_robot` makes")
+    checks.on_host("robot", robot, "righting")
+    if pieces is None:
+        pieces = PIECES if robot.joints < MANY_JOINTS else FEW_PIECES
+    pieces = checks.whole("pieces", pieces, 3)
+    first = posture(robot, "start", np.zeros(robot.joints) if start is None else start)
+    last = first if end is None else posture(robot, "end", end)
+    reasonable(robot, first, momenta, seconds)
     if weights is None:
         price = np.diagonal(np.asarray(joint_inertia(robot, first))) ** 2
     else:
@@ -140,16 +158,15 @@ def _righting(robot, goals, momenta, duration, start, end, motors, clearance, we
     if clearance is not None and not robot.collision_pairs:
         raise ValueError(f"`clearance` is {clearance}, but {robot.name!r} has no collision pairs.")
     known = None if motors is None else check_motors(motors, robot)
-    least = None if clearance is None else np.asarray(checks.number("clearance", clearance, unit="m"))
-    known = None if known is None else per_joint(known, np.dtype(float))
+    least, spare = None, np.zeros(())
+    if clearance is not None:
+        least = np.asarray(checks.number("clearance", clearance, unit="m"))
+        kept = {entry: float(np.asarray(clearances(robot, p)).min()) for entry, p in (("start", first), ("end", last))}
+        for entry, own in kept.items():
+            if own < least:
+                raise ValueError(f"`clearance` is {clearance} m; the posture at the {entry} has only {own:.4g} m.")
+        spare = np.minimum(_SPARE, min(kept.values()) - least)
     plain = without_names(robot, shapes=least is not None, couplings=True)  # one program for all robots of this tree
-    task = Task(plain, known, least, first, last, price / price.mean())
-    task = jax.tree.map(lambda x: jnp.asarray(x, float), task)
-    look = partial(search, task, pieces=pieces, starts=starts, tolerance=tolerance, max_steps=max_steps, seed=seed)
-    if duration is not None:
-        found = look(goals, h, np.full(len(h), seconds))
-        if motors is None or found.converged.all():
-            return found
-    else:
-        found = look(goals, h, np.full(len(h), seconds))
-    return least_durations(look, found, goals, h, keep=duration is not None)
+    task = Task(plain, None if known is None else per_joint(known, np.dtype(float)), least, spare, first, last,
+                price / price.mean())  # fmt: skip
+    return jax.tree.map(lambda x: jnp.asarray(x, float), task), pieces

@@ -11,14 +11,18 @@ import numpy as np
 from reojax import so3
 from reojax.mechanics.momentum import momentum_matrices
 from reojax.optimisation.status import Status
+from reojax.steering.clear_motion import proven_clearance
 from reojax.steering.end import basis
 from reojax.steering.limits import FEASIBLE, Task
 from reojax.steering.newton import EXACT_STEPS, solve
-from reojax.steering.result import Righting
+from reojax.steering.result import Righting, trajectory_through
 from reojax.steering.starts import RobotKey, random_motions
 
 LANES = 32
 """Motions that are searched for side by side, at most."""
+
+
+_LEAST = Righting._fields.index("least_duration")
 
 
 def search(task: Task, goals, momenta, durations, *, pieces, starts, tolerance, max_steps, seed) -> Righting:
@@ -56,13 +60,19 @@ def search(task: Task, goals, momenta, durations, *, pieces, starts, tolerance, 
     rows = [best[i][2] for i in range(m)]
     points, error, beyond, effort, rotation, omega, margin, steps = (np.stack(x) for x in zip(*rows, strict=True))
     good = np.array([best[i][0] for i in range(m)])
+    nothing = np.full(m, np.nan)
+    clear = nothing.copy()
+    if task.clearance is not None:
+        for i in range(m):
+            clear[i] = proven_clearance(task.robot, trajectory_through(points[i], float(durations[i])))
+        beyond = np.maximum(beyond, float(task.clearance) - clear)
+        good &= beyond <= FEASIBLE
     status = np.where(good, Status.CONVERGED, np.where(error > tolerance, Status.NOT_FOUND, Status.INFEASIBLE))
     fine = basis(pieces, EXACT_STEPS).nodes[:, 0] @ points
     travel = np.abs(np.diff(fine, axis=1)).sum((1, 2))
-    nothing = np.full(m, np.nan)
     margin = nothing if task.motors is None else margin
     return Righting(points, durations, momenta, rotation, omega, error, beyond, margin, effort, travel, good, status,
-                    steps, nothing)  # fmt: skip
+                    steps, nothing, clear)  # fmt: skip
 
 
 def least_durations(search, found: Righting, goals, momenta, *, keep: bool) -> Righting:
@@ -91,9 +101,9 @@ def least_durations(search, found: Righting, goals, momenta, *, keep: bool) -> R
             else:
                 low = middle
         if keep:
-            fields[-1][i] = high
+            fields[_LEAST][i] = high
         else:
             for field, value in zip(fields, best, strict=True):
                 field[i] = value[0]
-            fields[-1][i] = high
+            fields[_LEAST][i] = high
     return Righting(*fields)

@@ -22,6 +22,8 @@ _MEANING = {
     "direction": "change of each joint per steering vector, row by row: p = -direction c",
     "gramian": "what the rest of the motion can turn, row by row",
     "rest": "added to its diagonal",
+    "momentum": "angular momentum that the gains are made for, inertial frame [kg m^2/s]",
+    "to_end": "what an error here is at the end if nothing is done, row by row",
 }
 
 
@@ -34,16 +36,20 @@ def gain_table(gains: CorrectionGains) -> dict[str, np.ndarray]:
         quaternion[k] *= 1.0 if quaternion[k] @ quaternion[k - 1] >= 0 else -1.0
     table = {name: np.asarray(getattr(gains, name), float) for name in _FIELDS if name != "quaternion"}
     table["rest"] = np.full(len(quaternion), table["rest"])
-    return {name: quaternion if name == "quaternion" else table[name] for name in _FIELDS}
+    found = {name: quaternion if name == "quaternion" else table[name] for name in _FIELDS}
+    momentum = np.asarray(gains.momentum, float)
+    found["momentum"] = np.tile(momentum, (len(quaternion), 1))
+    return found | ({"to_end": np.asarray(gains.to_end, float)} if momentum.any() else {})
 
 
 def write_gains(gains: CorrectionGains, path: str | Path, *, name: str = "reojax_gains") -> None:
     """Write the table of the on-board law: `.csv`, all digits, or `.h`, C arrays of `float`.
 
     A row for each sample: time, joint angles and rates, orientation (w, x, y, z), angular velocity, connection (3 j),
-    direction (3 j), Gramian (9) and rest, 18 + 8 j numbers. Four edges of three joints at 8 samples an edge are 5.5 kB
+    direction (3 j), Gramian (9) and rest, 21 + 8 j numbers. Four edges of three joints at 8 samples an edge are 5.5 kB
     of C floats, and hold joints and orientation to some 2e-3 rad; at 16 samples 11 kB and 1e-4 rad.
-    `direction (gramian + rest)^-1` is the gain. For motions without momentum: `to_end` is left out.
+    `direction (gramian + rest)^-1 to_end` is the gain. The momentum that they are made for is in the file; where there
+    is any, so is `to_end` (9 numbers a row), and without it errors stay what they are.
 
     Args:
         gains: the gains.
@@ -83,12 +89,14 @@ def _header(table: dict[str, np.ndarray], name: str) -> str:
         f"#define {guard}",
         f"#define {name.upper()}_SAMPLES {samples}",
         f"#define {name.upper()}_JOINTS {joints}",
+        f"/* made for an angular momentum of {table['momentum'][0].tolist()} kg m^2/s, inertial frame */",
     ]
     for field, values in table.items():
+        values = values[0] if field == "momentum" else values  # the same in each row
         sizes = "".join(f"[{size}]" for size in values.shape)
         lines.append(f"/* {_MEANING[field]} */")
         lines.append(f"static const float {name}_{field}{sizes} = {{")
-        lines += [f"  {_braced(row)}," for row in values]
+        lines += [f"  {_braced(np.asarray(row))}," for row in values]
         lines.append("};")
     return "\n".join([*lines, f"#endif /* {guard} */", ""])
 

@@ -6,7 +6,8 @@ from typing import Any
 
 Source = Iterator[tuple[str, Callable[[], Any]]]
 LONG = {
-    "functions that compile little": 8000,
+    "functions that compile nothing": 9000,
+    "functions that compile little": 4000,
     "functions that compile": 400,
     "command lines that compute little": 3000,
     "command lines that compute": 60,
@@ -26,7 +27,11 @@ def source(kind: str, seed: int) -> Source | None:
     if kind.startswith("functions"):
         from fuzz import subjects
 
-        return subjects.calls(subjects.DEAR if kind.endswith("compile") else subjects.CHEAP, draw)
+        if kind.endswith("compile"):
+            return subjects.calls(subjects.DEAR, draw)
+        compiling = {name: subjects.CHEAP[name] for name in subjects.COMPILING}
+        nothing = {name: subject for name, subject in subjects.CHEAP.items() if name not in compiling}
+        return subjects.calls(nothing if kind.endswith("nothing") else compiling, draw)
     if kind.startswith("command lines"):
         from fuzz import lines
 

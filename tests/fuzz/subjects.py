@@ -160,6 +160,10 @@ CHEAP: dict[str, tuple[Any, dict[str, Any]]] = {
 }  # fmt: skip
 """What takes some milliseconds."""
 
+COMPILING = """momentum_matrices connection angular_momentum inverse_dynamics joint_inertia curvature link_poses
+centre_of_mass clearance gains so3.exp so3.log so3.from_quaternion view write_mjcf""".split()
+"""Those that compile a program all the same."""
+
 DEAR: dict[str, tuple[Any, dict[str, Any]]] = {
     "net_rotation": ("net_rotation", {"robot": ROBOT, "path": PATH, "steps": 2}),
     "rotation_history": ("rotation_history", {"robot": ROBOT, "path": PATH, "samples": 4}),
@@ -173,7 +177,7 @@ DEAR: dict[str, tuple[Any, dict[str, Any]]] = {
     ),
     "released": (
         "released",
-        {"robot": ROBOT, "trajectory": TRAJECTORY, "release": reojax.Release(), "steps": 4, "substeps": None},
+        {"robot": ROBOT, "trajectory": TRAJECTORY, "release": reojax.Release(), "samples": 4, "substeps": None},
     ),
     "release": (_release, {"momentum": (0.0, 0.0, 1e-4), "drag": 1e-6, "pull": (0.0, 0.0, 0.0)}),
     "release_spread": (
@@ -217,7 +221,7 @@ DEAR: dict[str, tuple[Any, dict[str, Any]]] = {
     ),
     "design.spread": (
         "design.spread",
-        {"robot": ROBOT, "path": PATH, "tolerances": {"mass": 1e-3}, "samples": 4, "seed": 0, "steps": 2},
+        {"robot": ROBOT, "path": PATH, "tolerances": {"mass": 1e-3}, "draws": 4, "seed": 0, "steps": 2},
     ),
     "design.sensitivities": ("design.sensitivities", {"robot": ROBOT, "path": PATH, "steps": 2}),
     "sweep": (_sweep, {"function": lambda a: {"b": a * 2}, "axes": {"a": np.arange(4.0)}, "chunk_size": 2}),

@@ -8,7 +8,8 @@ from fuzz.kinds import LONG, source
 from fuzz.tally import Tally
 
 SHORT = {
-    "functions that compile little": 600,
+    "functions that compile nothing": 1500,
+    "functions that compile little": 150,
     "command lines that compute little": 150,
     "captures": 300,
     "robots, JSON": 200,

@@ -1,13 +1,13 @@
 """Words near a target: looked through one by one for few targets, looked up in a tree for many."""
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from reojax.planning.initial_guesses import _FEW, _Words
 
 
 def _quaternions(count: int, seed: int) -> np.ndarray:
-    return np.roll(Rotation.random(count, random_state=seed).as_quat(), 1, axis=1).T
+    q = np.random.default_rng(seed).normal(size=(4, count))
+    return q / np.sqrt((q * q).sum(0))
 
 
 def test_both_ways_find_the_same_words():

@@ -8,7 +8,8 @@ import reojax
 from reojax import robots, so3
 from reojax.collision.clearance import clearances
 from reojax.steering.clear_of_itself import keep_of, towards
-from reojax.steering.feedback import Reading, Steering
+from reojax.steering.feedback import Steering
+from reojax.steering.readings import Reading
 
 ROBOT = robots.prototype()
 MOTION = reojax.along(

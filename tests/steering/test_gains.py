@@ -182,7 +182,8 @@ def test_the_files_hold_the_table(tmp_path):
     assert table.keys() == again.keys()
     assert all((table[name] == again[name]).all() for name in table)
     write_gains(TIMED, tmp_path / "gains.h", name="turn")
-    assert sum(values.size for values in table.values()) * 4 < 6000
+    once = table["momentum"].size - 3  # in the header there is one row of it
+    assert (sum(values.size for values in table.values()) - once) * 4 < 6000
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
         pytest.skip("no C compiler")
@@ -194,6 +195,23 @@ def test_the_files_hold_the_table(tmp_path):
     subprocess.run([compiler, "-o", tmp_path / "main", tmp_path / "main.c"], check=True)
     printed = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout
     np.testing.assert_array_equal(np.array(printed.split(), np.float32), table["direction"].ravel().astype(np.float32))
+
+
+def test_the_files_say_which_momentum_they_are_made_for(tmp_path):
+    """In the CSV and in the header; with momentum `to_end` is there too, and the law on board uses it."""
+    gains = reojax.correction_gains(ROBOT, TRAJECTORY, samples=8, momentum=MOMENTUM)
+    write_gains(gains, tmp_path / "gains.csv")
+    table = onboard.read(tmp_path / "gains.csv")
+    np.testing.assert_array_equal(table["momentum"][3], MOMENTUM)
+    np.testing.assert_array_equal(table["to_end"], np.asarray(gains.to_end))
+    np.testing.assert_array_equal(onboard.at(table, 0.0)["to_end"], np.asarray(gains.to_end[0]))
+    write_gains(gains, tmp_path / "gains.h", name="turn")
+    text = (tmp_path / "gains.h").read_text()
+    assert str(MOMENTUM.tolist()) in text
+    assert "static const float turn_momentum[3]" in text
+    assert "turn_to_end[33][3][3]" in text
+    write_gains(TIMED, tmp_path / "still.h", name="turn")
+    assert "to_end" not in (tmp_path / "still.h").read_text().split("#ifndef")[1]
 
 
 @pytest.mark.parametrize("lag", [1, 4])

@@ -2,6 +2,7 @@
 
 import importlib.util
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -91,3 +92,17 @@ def test_what_it_refuses(options, said):
     given = {"robot": ROBOT, "target": np.eye(3), "momentum": np.zeros(3), "duration": 0.5} | options
     with pytest.raises(ValueError, match=said):
         righting(given.pop("robot"), given.pop("target"), **given)
+
+
+def test_clearance_is_proven_along_the_whole_motion():
+    """No sample between the nodes is nearer than what is said, and what is said is not far from the nearest."""
+    found = righting(ROBOT, TARGETS[1], momentum=MOMENTA[1], duration=0.62, clearance=0.004)
+    assert found.converged
+    assert found.clearance > 0.004 - 1.1e-4
+    times = np.linspace(0, 0.62, 1501)
+    postures = jax.vmap(found.trajectory.at)(times).theta
+    sampled = np.asarray(jax.vmap(lambda theta: reojax.clearance(ROBOT, theta))(postures)).min()
+    assert found.clearance <= sampled < found.clearance + 5e-4
+    assert np.isnan(FOUND.clearance).all()
+    with pytest.raises(ValueError, match="posture at the start has only"):
+        righting(ROBOT, TARGETS[1], momentum=MOMENTA[1], duration=0.62, clearance=0.5)
