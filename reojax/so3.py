@@ -228,7 +228,7 @@ def _floats(value: ArrayLike | float | int, name: str, shape: tuple[int, ...]) -
     refuse_lookalikes(name, value)
     try:
         array = jnp.asarray(value)
-    except (TypeError, ValueError, OverflowError) as error:
+    except (TypeError, ValueError, ArithmeticError) as error:
         raise ValueError(f"`{name}` must be an array of numbers of shape {shape}; got {shorten(value)}.") from error
     if array.shape != shape:
         raise ValueError(f"`{name}` has shape {array.shape}; it must be {shape}.")

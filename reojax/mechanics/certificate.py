@@ -71,6 +71,7 @@ def certify(robot: Robot, path: Path, *, steps: int = DEFAULT_STEPS, samples: in
     Warns:
         UserWarning: in float32, where `momentum` is some 0.01 by the rounding of the differences.
     """
+    check_path(check_robot(robot), path)
     warn_if_single("the levels of a certificate are not reached", common_float(robot, path))
     return certify_rotation(robot, path, steps=steps, samples=samples)[0]
 
@@ -184,6 +185,7 @@ def _product(subscripts: str, *factors: Array) -> jax.Array:
     return jnp.einsum(subscripts, *(jnp.asarray(factor) for factor in factors), precision="highest")
 
 
+@jax.jit  # where numbers are traced, so3 passes NaN on: a certificate of NaN is NaN
 def _distance(first: Array, second: Array) -> Array:
     return so3.angle(jnp.matmul(first.T, second, precision="highest"))
 

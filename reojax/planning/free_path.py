@@ -189,6 +189,7 @@ def free_paths(
         max_steps: most steps of the solver.
         seed: of the random polygons.
         progress: whether to show a bar on stderr, or what to write before it.
+        momentum: to be left out: these paths are for zero angular momentum; with one there is `righting`.
 
     Returns:
         The paths. Where a target is not reached, the closest path found, with `converged` False and the reason in

@@ -2,8 +2,8 @@
 
 **Published** (de Leva, J. Biomechanics 29(9), 1996, table 4, male): mass, length, centre of mass and radii of gyration
 of each segment, in shares of a body of 73 kg and of the segment's length; mean lengths. Typed from memory and then
-compared, digit by digit, with what other programs have from that table (BioBuddy 0.3.2 and two others); where
-they give a segment between other end points, mass centre and radii agree once scaled by the two lengths. Hands stay in
+compared with what other programs have from that table (BioBuddy 0.3.2 and two others): limbs, trunk and head agree
+digit by digit, the hand's radii once scaled by a length of the hand that is inferred. Hands stay in
 line with the forearms, feet at right angles to the shanks, the head in line with the trunk.
 
 **Chosen**: breadths between the joint centres of shoulders and hips, the height of the ankle, the limits (rounded below

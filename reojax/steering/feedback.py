@@ -75,7 +75,7 @@ def Steering(
         samples: of each piece of the trajectory, for the tables.
         weights: (j,) price of changing each joint, as for `correction_gains`.
         left: damping of a correction, in shares of the authority at the start.
-        steps: of the prediction of the end by the estimated robot, at each reading; 0 takes the linear law of
+        steps: steps of the prediction of the end by the estimated robot, at each reading; 0 takes the linear law of
             `reojax.steering.onboard` instead, which is cheaper and holds for small errors.
         goal: (3, 3) orientation to end in, the base starting at the identity; default where the motion ends.
         clearance: least distance between the robot's parts, from 0 up, that every posture which the joints are told is

@@ -77,8 +77,8 @@ def righting_for_all(
         weights: see there.
         pieces: see there.
         tries: motions to start from.
-        max_steps: steps from each.
-        seed: of the first of them.
+        max_steps: most steps from each.
+        seed: of the random motions that the first of them starts from.
 
     Raises:
         ValueError: naming the entry, its value and the rule.

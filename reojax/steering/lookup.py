@@ -94,9 +94,9 @@ def righting_table(
         clearance: see there.
         weights: see there.
         pieces: see there.
-        tolerance: see there.
-        max_steps: see there.
-        seed: see there.
+        tolerance: angle to the target that counts as reached [rad].
+        max_steps: most steps of the solver from each start.
+        seed: of the random motions to start from.
 
     Raises:
         ValueError: naming the entry, its value and the rule; or if the motion of the middle is not found.

@@ -29,5 +29,6 @@ def test_the_continuous_integration_runs_the_readme_commands():
     install, _, run = COMMANDS[1].partition(" && ")
     assert install.removeprefix("pip install ") in script
     assert re.search(rf"^\s*{run}\b", script, re.MULTILINE)
-    assert 'python "$1" --quick' in script
+    assert 'python "$root/experiments/$1.py" --quick' in script
+    assert "cd experiments && ls ./*.py" in script
     assert (ROOT / COMMANDS[0].split()[-1]).parent == ROOT / "experiments"

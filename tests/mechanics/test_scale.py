@@ -58,6 +58,7 @@ def test_any_unit_of_mass_and_length(dtype):
     unchanged()
 
 
+@pytest.mark.filterwarnings("ignore:the levels of a certificate")
 @pytest.mark.parametrize("power", [-25, 25])
 def test_the_certificate_in_any_unit(power):
     """In float32, where squares of such momenta are out of range."""
