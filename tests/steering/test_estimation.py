@@ -20,7 +20,7 @@ NOISE, TICK, LAG, DRAG, OFF = np.deg2rad(0.5), 4e-3, 2, 4e-7, 0.1
 NAMES = [f"inertia_scale[{link}]" for link in range(4)]
 LAW = Steering(
     WIDE, PLAN, momentum_std=SPREAD, drag_std=DRAG, noise=NOISE, parameters=NAMES, parameters_std=[OFF] * 4,
-    samples=16, steps=24, settle=3e-2,
+    samples=16, steps=24, settle=3e-2, left=1.0,
 )  # fmt: skip
 TICKS = round(0.62 / TICK)
 GOAL = np.asarray(LAW.goal)
