@@ -70,7 +70,7 @@ def maps(quick: bool) -> dict:
 def targets(quick: bool) -> list[dict]:
     """Roll and pitch, by words and by free paths, with clearance and without."""
     rows = []
-    for name, vector in (("pitch 90", [np.pi / 2, 0, 0]), ("roll 180", [0, 0, np.pi]))[: 1 if quick else 2]:
+    for name, vector in (("roll 180", [0, 0, np.pi]), ("pitch 90", [np.pi / 2, 0, 0]))[: 1 if quick else 2]:
         turn = np.asarray(so3.exp(np.array(vector, float)))
         for margin in (None, MARGIN):
             for kind in ("word", "free"):
