@@ -19,7 +19,7 @@ def replay(robot: reojax.Robot, found: reojax.Righting, steps: int = 400) -> np.
     foreign = interop.mujoco_model(robot)
     model = foreign.model
     data = mujoco.MjData(model)
-    mass = np.zeros((model.nv, model.nv))
+    mass, pushed = np.zeros((6, model.nv)), np.zeros(model.nv)
     trajectory, end = found.trajectory, float(found.duration)
     breaks, coefficients = np.asarray(trajectory.breaks), np.asarray(trajectory.coefficients)
 
@@ -35,9 +35,11 @@ def replay(robot: reojax.Robot, found: reojax.Righting, steps: int = 400) -> np.
         data.qvel[:6], data.qvel[6:] = speed, foreign.angles @ rate
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
-        mujoco.mj_fullM(model, mass, data.qM)
-        pushed = mass[:6, 6:] @ (foreign.angles @ acceleration) + data.qfrc_bias[:6]
-        return -np.linalg.solve(mass[:6, :6], pushed)
+        for k in range(6):  # columns of the mass matrix; `mj_fullM` is called differently in each version
+            mujoco.mj_mulM(model, data, mass[k], np.eye(model.nv)[k])
+        asked = np.concatenate([np.zeros(6), foreign.angles @ acceleration])
+        mujoco.mj_mulM(model, data, pushed, asked)
+        return -np.linalg.solve(mass[:, :6], pushed[:6] + data.qfrc_bias[:6])
 
     def moved(base: np.ndarray, speed: np.ndarray, h: float) -> np.ndarray:
         """The base after `h` at constant speed: linear in the inertial frame, angular in the base frame."""
