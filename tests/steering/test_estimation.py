@@ -61,25 +61,35 @@ RNG = np.random.default_rng(3)
 MANY = 24
 MOMENTUM, DRAGS = RNG.normal(size=(MANY, 3)) * SPREAD, np.abs(RNG.normal(size=MANY)) * DRAG
 SCALES = np.exp(OFF * RNG.normal(size=(MANY, 4)))
-FLOWN = falls(jax.random.split(jax.random.key(0), MANY), MOMENTUM, DRAGS, SCALES, np.ones(MANY))
-FREE = falls(jax.random.split(jax.random.key(0), MANY), MOMENTUM, DRAGS, SCALES, np.zeros(MANY))
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """Falls that are steered."""
+    return falls(jax.random.split(jax.random.key(0), MANY), MOMENTUM, DRAGS, SCALES, np.ones(MANY))
+
+
+@pytest.fixture(scope="module")
+def free():
+    """The same, let alone."""
+    return falls(jax.random.split(jax.random.key(0), MANY), MOMENTUM, DRAGS, SCALES, np.zeros(MANY))
 
 
 def errors(ends) -> np.ndarray:
     return np.array([so3.angle(jnp.asarray(GOAL.T @ end)) for end in np.asarray(ends)])
 
 
-def test_it_helps_a_robot_whose_inertias_are_wrong():
+def test_it_helps_a_robot_whose_inertias_are_wrong(flown, free):
     """Inertias off by 10 %, momentum, drag, noise, latency, dropped frames: much of the error is taken back."""
-    steered, free = errors(FLOWN[0]), errors(FREE[0])
-    assert np.median(free) > np.deg2rad(3)
-    assert np.median(steered) < 0.6 * np.median(free)
-    assert np.quantile(steered, 0.9) < 0.8 * np.quantile(free, 0.9)
+    steered, alone = errors(flown[0]), errors(free[0])
+    assert np.median(alone) > np.deg2rad(3)
+    assert np.median(steered) < 0.6 * np.median(alone)
+    assert np.quantile(steered, 0.9) < 0.8 * np.quantile(alone, 0.9)
 
 
-def test_estimates_are_as_near_as_their_covariance_says():
+def test_estimates_are_as_near_as_their_covariance_says(flown, free):
     """Mean of the squared errors in the metric of the covariance: one for each number; and better than the prior."""
-    for ends in (FREE, FLOWN):
+    for ends in (free, flown):
         state = ends[1]
         off = np.concatenate([np.asarray(state.momentum) - MOMENTUM, np.asarray(state.values) - SCALES], axis=1)
         chosen = np.r_[3:6, 7:11]
@@ -92,14 +102,14 @@ def test_estimates_are_as_near_as_their_covariance_says():
         assert np.sqrt((off[:, 3:] ** 2).mean()) < 0.8 * OFF
 
 
-def test_what_the_joints_are_told_does_not_jump():
+def test_what_the_joints_are_told_does_not_jump(flown):
     """From tick to tick, by no more than the motion's own rate and a share of the largest change."""
-    assert np.asarray(FLOWN[2]).max() < 0.45
+    assert np.asarray(flown[2]).max() < 0.45
 
 
-def test_the_estimate_goes_on_into_the_next_motion():
+def test_the_estimate_goes_on_into_the_next_motion(flown):
     """After `resume`, time begins again; in the first motion's frame, what is believed is what was believed."""
-    state = jax.tree.map(lambda x: x[0], FLOWN[1])
+    state = jax.tree.map(lambda x: x[0], flown[1])
     onward, begun = LAW.resume(state, LAW)
     before, after = LAW.believed(state), onward.believed(begun)
     np.testing.assert_allclose(after.rotation, before.rotation, atol=1e-12)
