@@ -19,7 +19,7 @@ def replay(robot: reojax.Robot, found: reojax.Righting, steps: int = 400) -> np.
     foreign = interop.mujoco_model(robot)
     model = foreign.model
     data = mujoco.MjData(model)
-    mass, pushed = np.zeros((6, model.nv)), np.zeros(model.nv)
+    unit, mass, pushed = np.eye(6, model.nv), np.zeros((6, model.nv)), np.zeros(model.nv)
     trajectory, end = found.trajectory, float(found.duration)
     breaks, coefficients = np.asarray(trajectory.breaks), np.asarray(trajectory.coefficients)
 
@@ -36,7 +36,7 @@ def replay(robot: reojax.Robot, found: reojax.Righting, steps: int = 400) -> np.
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
         for k in range(6):  # columns of the mass matrix; `mj_fullM` is called differently in each version
-            mujoco.mj_mulM(model, data, mass[k], np.eye(model.nv)[k])
+            mujoco.mj_mulM(model, data, mass[k], unit[k])
         asked = np.concatenate([np.zeros(6), foreign.angles @ acceleration])
         mujoco.mj_mulM(model, data, pushed, asked)
         return -np.linalg.solve(mass[:, :6], pushed[:6] + data.qfrc_bias[:6])

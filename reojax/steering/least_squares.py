@@ -32,11 +32,11 @@ class _State(NamedTuple):
     damping: Array
 
 
-@partial(jax.jit, static_argnums=(1, 2))
+@partial(jax.jit, static_argnums=1)
 def solve_for_all(
     task: Task,
     pieces: int,
-    max_steps: int,
+    max_steps: int | Array,
     points: Float[Array, "m p+1 j"],
     goal: Float[Array, "3 3"],
     momenta: Float[Array, "k 3"],
@@ -48,7 +48,7 @@ def solve_for_all(
     return jax.vmap(one, (0, None, None, None, None))(points, goal, momenta, shares, duration)
 
 
-def _solve_one(task: Task, pieces: int, max_steps: int, points, goal, momenta, shares, duration):
+def _solve_one(task: Task, pieces: int, max_steps: int | Array, points, goal, momenta, shares, duration):
     robot, dtype = task.robot, points.dtype
     variables, x = free_points(robot, points)
     rows = rows_at_steps(pieces, STEPS, duration, dtype)
@@ -93,11 +93,12 @@ def _solve_one(task: Task, pieces: int, max_steps: int, points, goal, momenta, s
 
     s = jax.lax.fori_loop(0, max_steps, step, _State(x, *around(x), jnp.asarray(1e-2, dtype)))
     points = variables.of(s.x)
-    angles = jax.vmap(lambda h: judged(task, pieces, points, goal, h, duration, jnp.asarray(max_steps)).error)(momenta)
-    mean = shares @ momenta
-    beyond = jax.vmap(lambda h: judged(task, pieces, points, goal, h, duration, jnp.asarray(max_steps)).beyond)(momenta)
-    answer = judged(task, pieces, points, goal, mean, duration, jnp.asarray(max_steps))
-    return answer._replace(beyond=beyond.max()), angles
+
+    def judge(h: Array) -> Answer:
+        return judged(task, pieces, points, goal, h, duration, jnp.asarray(max_steps))
+
+    each = jax.vmap(judge)(momenta)
+    return judge(shares @ momenta)._replace(beyond=each.beyond.max()), each.error
 
 
 def cubature(momentum: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -177,7 +176,7 @@ def _bounds(robot: Robot, goal: np.ndarray, axes, points: np.ndarray, duration: 
     return bounds
 
 
-@partial(jax.jit)
+@jax.jit
 def _misses(robot, corners, low, size, goal, duration, places) -> tuple[Array, Array]:
     """Rotation vectors that are missed at the places (q, 3) of a cell, and their slopes by the place."""
 
