@@ -78,10 +78,10 @@ def travel(box: AmplitudeBox, rows: Candidates) -> np.ndarray:
     return (price(box, rows.letter, rows.runs) * np.abs(rows.x)).sum((0, 1))
 
 
-def attempt(context: Context, targets: np.ndarray, rows: Candidates) -> Candidates:
+def attempt(context: Context, targets: np.ndarray, rows: Candidates, bursts: int = len(_BURSTS)) -> Candidates:
     """Solve rows on the table; after some steps only those go on that still come nearer."""
     found, going = rows._replace(x=rows.x.copy(), square=rows.square.copy()), np.arange(len(rows.owner))
-    for steps in _BURSTS:
+    for steps in _BURSTS[:bursts]:
         if not len(going):
             break
         x, square, more = _on_table(

@@ -5,7 +5,7 @@ near the target and are solved; what is found is solved again on the true rotati
 start succeeds, so "not with fewer" is a numerical decision, not a proof.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -27,13 +27,13 @@ from reojax.planning.variations import vary
 
 LONGEST = 6
 """Longest word whose loops each have amplitudes of their own; longer words repeat loops."""
-_ROUNDS = ((0, FIRST), (FIRST, 10), (10, 40))
-"""Starts tried for each target, from and to; each round where those before failed."""
-_LAST_ROUND = (40, 240)
-"""Further starts for what is not reached with the longest word that is allowed, however far off the others ended."""
-_LONGEST_ROUND = (240, 2000)
-"""Yet more for words of `LONGEST` loops, after which there is nothing else to try: on robots with tilted axes and
-unequal links they reach one more of four targets that those before miss, in 80 ms each."""
+_FEW_ROUNDS = (("near", 0, FIRST), ("near", FIRST, 10), ("near", 10, 40))
+"""Starts tried for each target with one or two loops: which set, from and to; each round where those before failed."""
+_ROUNDS = (("bent", 0, FIRST), ("bent", FIRST, 10), ("near", 0, FIRST), ("bent", 10, 40))
+"""The same for more loops, of which few amplitudes are small."""
+_LAST_FEW_ROUNDS = (*_FEW_ROUNDS, ("near", 40, 240))
+_LAST_ROUNDS = (("bent", 0, FIRST), ("bent", FIRST, 10), ("bent", 10, 40), ("bent", 40, 100))
+"""Starts for what is not reached with the longest word that is allowed, however far off the others ended."""
 _HOPE = 0.1
 """Squared residual [rad^2] that some start must come down to for another round."""
 _FAR = {1: 0.06, 2: 0.1, 3: 0.15}
@@ -93,53 +93,62 @@ def fewest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -> 
     answer = Answer(scene, targets, tolerance)
     longest = min(most, LONGEST)
     for slots in range(1, longest + 1):
-        _with_loops(scene, targets, answer, slots, _ROUNDS)
+        _with_loops(scene, targets, answer, slots)
     if most > LONGEST:
         _with_small_loops(scene, targets, most, answer, loops)
-    last = (_LONGEST_ROUND,) if longest == LONGEST else ()
-    _with_loops(scene, targets, answer, longest, (*_ROUNDS, _LAST_ROUND, *last), whatever=True)
-    _with_variations(scene, targets, answer, longest, most)
+    _with_what_is_left(scene, targets, answer, longest, most)
     return answer
 
 
-def _with_loops(
-    scene: Context,
-    targets: np.ndarray,
-    answer: Answer,
-    slots: int,
-    rounds: Sequence[tuple[int, int]],
-    whatever: bool = False,
-) -> None:
-    """Try words of `slots` loops for what is not reached yet; with `whatever` also where there is little hope."""
+def _with_loops(scene: Context, targets: np.ndarray, answer: Answer, slots: int) -> None:
+    """Try words of `slots` loops for what is not reached yet, where there is hope."""
     waiting = np.flatnonzero(~answer.solved)
-    if len(waiting) and not whatever:
+    if len(waiting):
         waiting = waiting[scene.pool.reaches(targets[:, waiting], slots, _FAR.get(slots, _FAR_LONG))]
     closest = np.zeros(len(waiting))
-    close = _CLOSE_FEW.get(slots, _CLOSE)
-    for first, last in rounds:
-        trying = np.flatnonzero(~answer.solved[waiting] & (whatever | (closest < _HOPE)))
+    for kind, first, last in _FEW_ROUNDS if slots in _CLOSE_FEW else _ROUNDS:
+        trying = np.flatnonzero(~answer.solved[waiting] & (closest < _HOPE))
         if not len(trying):
             break
-        starts = scene.pool.near(targets[:, waiting[trying]], slots, last)
-        some = Starts(*(field[..., first:last] for field in starts))
-        found = attempt(scene, targets, starting_rows(waiting[trying], some))
-        if slots in _CLOSE_FEW:
-            found = _continue_search(scene, targets, found)
+        starts = getattr(scene.pool, kind)(targets[:, waiting[trying]], slots, last)
+        found = _try(scene, targets, answer, slots, waiting[trying], starts, first)
         closest[trying] = found.square.reshape(-1, last - first).min(1)
-        missed = found.take(found.square >= close)
-        answer.update_best(least(missed, missed.square))
-        _update_from_solutions(scene, targets, answer, found.take(found.square < close), keep=1)
 
 
-def _with_variations(scene: Context, targets: np.ndarray, answer: Answer, slots: int, most: int) -> None:
-    """Try variations of the best words for what nothing else reached."""
+def _with_what_is_left(scene: Context, targets: np.ndarray, answer: Answer, slots: int, most: int) -> None:
+    """Try what there is still to try: more starts, however far off others ended, then variations of the best words."""
+    known = []
+    for kind, first, last in _LAST_FEW_ROUNDS if slots in _CLOSE_FEW else _LAST_ROUNDS:
+        waiting = np.flatnonzero(~answer.solved)
+        if not len(waiting):
+            return
+        starts = getattr(scene.pool, kind)(targets[:, waiting], slots, last)
+        known.append(_try(scene, targets, answer, slots, waiting, starts, first))
     waiting = np.flatnonzero(~answer.solved)
-    if not len(waiting):
-        return
-    found = vary(scene, targets, answer.rows.take(waiting), slots, most)
-    missed = found.take(found.square >= _CLOSE)
+    if len(waiting):
+        known = [part.take(np.isin(part.owner, waiting)) for part in known]
+        _update(scene, targets, answer, vary(scene, targets, [answer.rows.take(waiting), *known], slots, most), 4)
+
+
+def _try(
+    scene: Context, targets: np.ndarray, answer: Answer, slots: int, owner: np.ndarray, starts: Starts, first: int
+) -> Candidates:
+    """Solve the starts from the `first` one for the targets `owner`, and take the best."""
+    some = Starts(*(field[..., first:] for field in starts))
+    found = attempt(scene, targets, starting_rows(owner, some))
+    if slots in _CLOSE_FEW:
+        found = _continue_search(scene, targets, found)
+    _update(scene, targets, answer, found, 1, _CLOSE_FEW.get(slots, _CLOSE))
+    return found
+
+
+def _update(
+    scene: Context, targets: np.ndarray, answer: Answer, found: Candidates, keep: int, close: float = _CLOSE
+) -> None:
+    """Take the best of rows solved on the table; of those on the target, `keep` of least travel are settled."""
+    missed = found.take(found.square >= close)
     answer.update_best(least(missed, missed.square))
-    _update_from_solutions(scene, targets, answer, found.take(found.square < _CLOSE), keep=4)
+    _update_from_solutions(scene, targets, answer, found.take(found.square < close), keep)
 
 
 def _continue_search(scene: Context, targets: np.ndarray, found: Candidates) -> Candidates:
@@ -157,13 +166,11 @@ def cheapest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -
     answer = fewest(scene, targets, min(most, LONGEST), tolerance)
     waiting = np.flatnonzero((answer.travel > 0) | ~answer.solved)
     for slots in range(1, min(most, LONGEST) + 1):
-        starts = scene.pool.near(targets[:, waiting], slots, _ROUNDS[-1][1])
+        starts = scene.pool.near(targets[:, waiting], slots, _FEW_ROUNDS[-1][2])
         rows = starting_rows(waiting, starts)
         value = travel(scene.box, rows) + 20 * starts.distance.ravel()
         found = attempt(scene, targets, least(rows, value, _LEAST_TRAVEL))
-        missed = found.take(found.square >= _CLOSE)
-        answer.update_best(least(missed, missed.square))
-        _update_from_solutions(scene, targets, answer, found.take(found.square < _CLOSE), keep=4)
+        _update(scene, targets, answer, found, keep=4)
     if most > LONGEST:
         _with_small_loops(scene, targets, most, answer, lambda rows: travel(scene.box, rows))
     return answer

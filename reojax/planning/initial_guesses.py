@@ -15,8 +15,9 @@ from reojax.session import LEAST_COMPILE
 
 _POOL = 4096
 """Loops drawn for each letter."""
-_WORDS = 1 << 16
-"""Words of each length."""
+_WORDS, _BENT_WORDS = 1 << 16, 1 << 18
+"""Words of each length, and those whose loops all bend as far as they may: there are more of them, as what needs them
+is far away."""
 _FEW = 16
 """Targets for which all words are looked through; more than these are looked up in a tree."""
 
@@ -40,7 +41,11 @@ class Starts(NamedTuple):
 
 
 class GuessTable:
-    """Random words of a table's loops by length, made when first asked for; seeded, so always the same."""
+    """Random words of a table's loops by length, made when first asked for; seeded, so always the same.
+
+    Two sets: of all loops, and of those whose centre joint bends to a limit. Few words of the first set come near the
+    targets that a number of loops barely reaches, and most words that do reach them are like those of the second.
+    """
 
     def __init__(self, table: Table, box: AmplitudeBox):
         rng = np.random.default_rng(0)
@@ -52,16 +57,16 @@ class GuessTable:
         small = rng.random(x.shape) < 0.1
         small[1] = False
         x = np.where(small, x * 10.0 ** -rng.uniform(0, 3, x.shape), x)
-        self._letter, self._x = letter, x
-        turns = x[::2] * x[1:2] < 0  # which way round, by each distal joint
-        self._kind = 2 * letter + turns[0] if len(turns) == 1 else 2 * turns[0] + turns[1]
-        self._q = np.asarray(_read(table, letter, x)[0])
-        self.letters, self.amplitudes, self.rotations = letter, x, self._q
-        self._words: dict[int, _Words] = {}
+        bent = rng.uniform(low, high)
+        bent[1] = np.where(rng.random(len(letter)) < 0.5, low[1], high[1])
+        self.letters, self.amplitudes = letter, x
+        self.rotations = np.asarray(_read(table, letter, x)[0])
+        self._all = _Loops(letter, x, self.rotations, _WORDS)
+        self._bent = _Loops(letter, bent, np.asarray(_read(table, letter, bent)[0]), _BENT_WORDS)
 
     def reaches(self, target: Float[np.ndarray, "4 m"], slots: int, within: float) -> Bool[np.ndarray, " m"]:
         """Whether a word of `slots` loops ends within a chord of each target."""
-        return self._words_of(slots).nearest(target, 1, within)[0][:, 0] < within
+        return self._all.words(slots).nearest(target, 1, within)[0][:, 0] < within
 
     def near(self, target: Float[np.ndarray, "4 m"], slots: int, count: int) -> Starts:
         """Words of `slots` loops near each target, (..., m, count), without regard to the quaternion's sign.
@@ -69,25 +74,45 @@ class GuessTable:
         First come the `FIRST` nearest ones, then the nearest of every kind (letters, and which way round each loop
         goes), then the second of every kind, and so on: where one fails, others of its kind mostly fail too.
         """
-        words = self._words_of(slots)
+        words = self._all.words(slots)
         asked = count if count <= FIRST else max(_CHOICE * count, _CANDIDATES)
         distance, nearest = words.nearest(target, asked)
-        loops = words.loops[:, nearest]
         if count < asked:
-            chosen = _by_kind(self._kind[loops])[:, :count]
-            distance = np.take_along_axis(distance, chosen, 1)
-            loops = np.take_along_axis(loops, chosen[None], 2)
-        return Starts(self._letter[loops], self._x[:, loops], distance)
+            chosen = _by_kind(self._all.kind[words.loops[:, nearest]])[:, :count]
+            distance, nearest = np.take_along_axis(distance, chosen, 1), np.take_along_axis(nearest, chosen, 1)
+        return self._all.starts(words.loops[:, nearest], distance)
 
-    def _words_of(self, slots: int) -> _Words:
+    def bent(self, target: Float[np.ndarray, "4 m"], slots: int, count: int) -> Starts:
+        """The `count` nearest words of loops that bend to a limit, as `near` gives words."""
+        words = self._bent.words(slots)
+        distance, nearest = words.nearest(target, count)
+        return self._bent.starts(words.loops[:, nearest], distance)
+
+
+class _Loops:
+    """Loops, and random words of them."""
+
+    def __init__(self, letter: Int[np.ndarray, " l"], x: Float[np.ndarray, "d l"], q: np.ndarray, words: int):
+        self._letter, self._x, self._q, self._size = letter, x, q, words
+        turns = x[::2] * x[1:2] < 0  # which way round, by each distal joint
+        self.kind = 2 * letter + turns[0] if len(turns) == 1 else 2 * turns[0] + turns[1]
+        self._words: dict[int, _Words] = {}
+
+    def words(self, slots: int) -> _Words:
+        """Words of `slots` loops; the same whatever was asked for before."""
         if slots not in self._words:
-            everything = np.arange(len(self._letter))[None]
-            loops = everything if slots == 1 else _of_length(slots, len(self._letter))
+            every = np.arange(len(self._letter))[None]
+            rng = np.random.default_rng(slots)
+            loops = every if slots == 1 else rng.integers(every.size, size=(slots, self._size))
             q = self._q[:, loops[0]]
             for row in loops[1:]:
                 q = np.stack(quaternions.product(q, self._q[:, row]))
             self._words[slots] = _Words(loops, q / np.sqrt((q * q).sum(0)))
         return self._words[slots]
+
+    def starts(self, loops: Int[np.ndarray, "k m n"], distance: Float[np.ndarray, "m n"]) -> Starts:
+        """Words to start from."""
+        return Starts(self._letter[loops], self._x[:, loops], distance)
 
 
 class _Words:
@@ -122,11 +147,6 @@ def _nearest(
     first = np.argpartition(square, count - 1)[:count]
     first = first[np.argsort(square[first], kind="stable")]
     return np.sqrt(square[first]), first
-
-
-def _of_length(slots: int, loops: int) -> np.ndarray:
-    """Loops (slots, words) of random words; the same whatever was asked for before."""
-    return np.random.default_rng(slots).integers(loops, size=(slots, _WORDS))
 
 
 def _by_kind(kinds: Int[np.ndarray, "k m n"]) -> Int[np.ndarray, "m n"]:

@@ -1,57 +1,64 @@
 """The closest word for a target that no start near it has reached: the best words so far, varied again and again.
 
-Words that come closest to such a target have most amplitudes at their limits, where few words of random amplitudes
-begin. So the best few are kept, some of their loops are drawn anew, all are solved, and of old and new the best few are
-kept again, until that helps no more. What is drawn does not depend on what else is planned at the same time.
+Words that barely reach such a target have many amplitudes at their limits. So the best few of those that were solved
+are kept, some of their loops are drawn anew, all are solved, and of old and new the best few are kept again, until that
+helps no more. What is drawn does not depend on what else is planned at the same time.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from reojax.planning.candidates import Candidates, Context, attempt
 
-_FIRST = 4000
-"""Random words to begin with, for each target."""
-_KEPT, _CHILDREN = 40, 15
+_KEPT, _CHILDREN = 6, 16
 """Words kept from one generation to the next, and variations of each."""
-_GENERATIONS, _PATIENCE = 60, 8
+_GENERATIONS, _PATIENCE = 60, 4
 """Most generations, and those in a row without a better word after which a target is left."""
-_BETTER = 0.99
+_BETTER = 0.9
 """Part of the squared residual that a better word may leave."""
-_TOGETHER = 32
+_BENT, _TWISTED = 0.9, 0.25
+"""Share of the bends and of the twists drawn anew that are at a limit."""
+_ALIKE = 1e-4
+"""Relative difference of squared residuals below which two words of a target are taken for the same."""
+_TOGETHER = 128
 """Targets solved together."""
 _DONE = 1e-13
 """Squared residual on the table [rad^2] at which a target is reached."""
 
 
-def vary(context: Context, targets: np.ndarray, known: Candidates, slots: int, most: int) -> Candidates:
-    """Rows of words of up to `slots` loops, repeated ones `most`, the best few for each target of a row in `known`."""
+def vary(context: Context, targets: np.ndarray, known: Sequence[Candidates], slots: int, most: int) -> Candidates:
+    """The best few words of up to `slots` loops, repeated ones `most`, for each target that has rows in `known`."""
+    rows = _together(known)
+    owners = np.unique(rows.owner)
     parts = []
-    for first in range(0, len(known.owner), _TOGETHER):
-        parts.append(_vary(context, targets, known.take(slice(first, first + _TOGETHER)), slots, most))
-    return _together(parts) if parts else known
+    for first in range(0, len(owners), _TOGETHER):
+        some = rows.take(np.isin(rows.owner, owners[first : first + _TOGETHER]))
+        parts.append(_vary(context, targets, some, slots, most))
+    return _together(parts)
 
 
 def _vary(context: Context, targets: np.ndarray, known: Candidates, slots: int, most: int) -> Candidates:
     rng = np.random.default_rng(0)
-    used = len(known.letter)
-    blank = np.arange(used) >= slots
-    letter, x = _draw(context, rng, (used, _FIRST))
-    letter = np.where(blank[:, None], -1, letter)
-    best = _best(_together([known, attempt(context, targets, _children(known, letter, x, np.ones(letter.shape)))]))
-    going = known.owner
-    least, stalled = np.full(len(going), np.inf), np.zeros(len(going), int)
+    blank = np.arange(len(known.letter)) >= slots
+    best = _best(known)
+    owners = np.unique(best.owner)
+    least, stalled = np.full(len(owners), np.inf), np.zeros(len(owners), int)
     for _ in range(_GENERATIONS):
-        now = best.square.reshape(len(known.owner), _KEPT)[:, 0]
+        now = best.square[np.searchsorted(best.owner, owners)]
         stalled = np.where(now < _BETTER * least, 0, stalled + 1)
         least = np.minimum(now, least)
-        going = known.owner[(now > _DONE) & (stalled < _PATIENCE)]
+        going = owners[(now > _DONE) & (stalled < _PATIENCE)]
         if not len(going):
             break
         parents = best.take(np.flatnonzero(np.isin(best.owner, going)))
-        children = attempt(context, targets, _variations(context, rng, parents, blank, most))
-        best = _best(_together([best, children]))
+        children = attempt(context, targets, _variations(context, rng, parents, blank, most), bursts=1)
+        rows = _together([best, children])
+        kept = _best_of(rows)
+        fresh = kept >= len(best.owner)  # what is not among the best after the first steps is not solved further
+        best = _best(_together([rows.take(kept[~fresh]), attempt(context, targets, rows.take(kept[fresh]))]))
     return best
 
 
@@ -65,10 +72,9 @@ def _variations(
     new[rng.integers(max(1, int((~blank).sum())), size=n), np.arange(n)] = True
     new &= ~blank[:, None]
     moved = 0.1 * rng.normal(size=x.shape) * (rng.random(n) < 0.5)
-    targets = len(parents.owner) // _KEPT
     child = parents.take(np.repeat(np.arange(len(parents.owner)), _CHILDREN))
-    letter, new = (np.tile(field, (1, targets)) for field in (letter, new))
-    x, moved = (np.tile(field, (1, 1, targets)) for field in (x, moved))
+    drawn = (_rank(parents.owner)[:, None] * _CHILDREN + np.arange(_CHILDREN)).ravel()  # the same for every target
+    letter, new, x, moved = (field[..., drawn] for field in (letter, new, x, moved))
     there = child.letter >= 0
     new &= there | (np.where(there, child.runs, 0).sum(0) + slots <= most)  # no more loops than are allowed
     letter = np.where(new, letter, child.letter)
@@ -81,34 +87,43 @@ def _variations(
 
 
 def _draw(context: Context, rng: np.random.Generator, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Letters and amplitudes, half of which are at a limit."""
+    """Letters and amplitudes, most bends and some twists at a limit."""
     box = context.box
     letter = rng.integers(len(box.letters), size=shape)
     low, high = (np.moveaxis(edge[letter], -1, 0) for edge in box[1:])
+    at_limit = np.array([_BENT if d == 1 else _TWISTED for d in range(len(low))])[:, None, None]
     limit = np.where(rng.random(low.shape) < 0.5, low, high)
-    return letter, np.where(rng.random(low.shape) < 0.5, limit, rng.uniform(low, high))
-
-
-def _children(known: Candidates, letter: np.ndarray, x: np.ndarray, runs: np.ndarray) -> Candidates:
-    """The same words for every target of `known`."""
-    m, n = len(known.owner), letter.shape[1]
-    x = np.where(letter >= 0, x, 0.0)
-    return Candidates(
-        np.repeat(known.owner, n),
-        np.tile(letter, (1, m)),
-        np.tile(runs, (1, m)),
-        np.tile(x, (1, 1, m)),
-        np.full(m * n, np.inf),
-    )
+    return letter, np.where(rng.random(low.shape) < at_limit, limit, rng.uniform(low, high))
 
 
 def _best(rows: Candidates) -> Candidates:
     """The `_KEPT` best rows of each target, best first, in the order of targets."""
+    return rows.take(_best_of(rows))
+
+
+def _best_of(rows: Candidates) -> np.ndarray:
+    """Where these are; of rows that ended alike, one."""
     order = np.lexsort((rows.square, rows.owner))
-    owner = rows.owner[order]
-    rank = np.arange(len(owner)) - np.searchsorted(owner, owner)
-    return rows.take(order[rank < _KEPT])
+    owner, square = rows.owner[order], rows.square[order]
+    alike = (np.diff(owner) == 0) & (np.diff(square) < _ALIKE * square[1:]) & (square[1:] > _DONE)
+    order = order[~np.concatenate([[False], alike])]
+    return order[_rank(rows.owner[order]) < _KEPT]
 
 
-def _together(parts: list[Candidates]) -> Candidates:
+def _rank(owner: np.ndarray) -> np.ndarray:
+    """Place of each row among those of its target, where targets are in order."""
+    return np.arange(len(owner)) - np.searchsorted(owner, owner)
+
+
+def _together(parts: Sequence[Candidates]) -> Candidates:
+    """Rows of several answers, words of any length."""
+    slots = max(len(part.letter) for part in parts)
+    parts = [_with_slots(part, slots) for part in parts]
     return Candidates(*(np.concatenate(field, axis=-1) for field in zip(*parts, strict=True)))
+
+
+def _with_slots(rows: Candidates, slots: int) -> Candidates:
+    """The same words with unused slots at their ends."""
+    more = ((0, slots - len(rows.letter)), (0, 0))
+    letter, runs = np.pad(rows.letter, more, constant_values=-1), np.pad(rows.runs, more, constant_values=1.0)
+    return rows._replace(letter=letter, runs=runs, x=np.pad(rows.x, ((0, 0), *more)))
