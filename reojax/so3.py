@@ -24,7 +24,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array, is_concrete, refuse_lookalikes
-from reojax._internal.checks import shorten
+from reojax._internal.checks import key as check_key, shorten
 from reojax._internal.quaternions import outer_rows
 
 
@@ -219,7 +219,11 @@ def random(key: jax.Array, dtype: type | np.dtype = float) -> Float[Array, "3 3"
     Args:
         key: a key of `jax.random`.
         dtype: of the result; JAX's default float if not given.
+
+    Raises:
+        ValueError: if it is no key.
     """
+    check_key("key", key)
     return from_quaternion(jax.random.normal(key, (4,), dtype))
 
 

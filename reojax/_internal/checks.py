@@ -4,9 +4,11 @@ Public functions call these once; what they call inside trusts its input.
 """
 
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+import inspect
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
+import jax
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -75,6 +77,49 @@ def positive(entry: str, value: Any, unit: str = "rad") -> float:
         in_unit = f", in {unit}" if unit else ""
         raise ValueError(f"`{entry}` is {shorten(value)}; it must be one positive number{in_unit}.")
     return float(array)
+
+
+def seed(value: Any) -> int:
+    """Return the `seed` of random numbers."""
+    return whole("seed", value, 0)
+
+
+def key(entry: str, value: Any) -> Any:
+    """Return one key of `jax.random`, of either kind."""
+    dtype = value.dtype if isinstance(value, jax.Array | np.ndarray) else None
+    typed = dtype is not None and jax.dtypes.issubdtype(dtype, jax.dtypes.prng_key) and not value.shape
+    raw = dtype == np.uint32 and value.shape == jax.eval_shape(lambda: jax.random.key_data(jax.random.key(0))).shape
+    if not (typed or raw):
+        raise ValueError(f"`{entry}` is {shorten(value)}; it must be one key, as `jax.random.key(0)` makes.")
+    return value
+
+
+def function(entry: str, value: Any, *takes: str) -> Callable[..., Any]:
+    """Return a function that can be called with so many arguments, as far as it tells."""
+    if not callable(value):
+        raise ValueError(f"`{entry}` is {shorten(value)}; it must be a function of ({', '.join(takes)}).")
+    try:
+        inspect.signature(value).bind(*takes)
+    except TypeError as error:
+        raise ValueError(f"`{entry}` cannot be called with ({', '.join(takes)}): {error}.") from None
+    except ValueError:  # it does not tell
+        pass
+    return value
+
+
+def mapping(entry: str, value: Any, what: str) -> Mapping[Any, Any]:
+    """Return a dictionary, or what can be read as one."""
+    if not isinstance(value, Mapping):
+        raise ValueError(f"`{entry}` is {shorten(value)}; it must map {what}.")
+    return value
+
+
+def rank(value: Any) -> int:
+    """Number of axes of an array to be; -1 of what does not make one, which `numbers` refuses by name."""
+    try:
+        return np.ndim(value)
+    except Exception:
+        return -1
 
 
 def listing(entry: str, value: Any, what: str) -> list[Any]:

@@ -136,11 +136,11 @@ def calibrate(
         raise ValueError(f"`clock` is {checks.shorten(clock)}; it must be True or False.")
     fitted = resolve(robot, parameters)
     problem = FitProblem(robot, capture, fitted, clock)
-    noise = _joint_noise(capture) if joint_noise is None else checks.number("joint_noise", joint_noise, unit="rad")
-    if not noise >= 0:
-        raise ValueError(
-            f"`joint_noise` is {checks.shorten(joint_noise)}; it must be a finite angle in radians, not negative."
-        )
+    noise = (
+        _joint_noise(capture)
+        if joint_noise is None
+        else checks.number("joint_noise", joint_noise, unit="rad", least=0, most=np.pi)
+    )
 
     start = np.array([p.start for p in fitted])
     begun = problem.fit_window(start)

@@ -6,6 +6,7 @@ frame, and the shift of their clock.
 
 from __future__ import annotations
 
+import warnings
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -111,9 +112,12 @@ class FitProblem:
         first = np.concatenate([begun.x[:p] / self.scale[:p], np.zeros(3)])
         if self.clock:
             lower, upper, first = [*lower, -most_shift], [*upper, most_shift], np.append(first, begun.offset)
-        rules: dict[str, Any] = {"x_scale": "jac", "ftol": 1e-10, "xtol": 1e-10, "gtol": None, "max_nfev": most}
-        # SciPy's types have no function for the derivatives
-        found = least_squares(residual, first, jacobian, (lower, upper), **rules)  # pyright: ignore[reportArgumentType]
+        # a slope of exactly 0, where nothing moves, is an end: from there SciPy's steps are no numbers
+        rules: dict[str, Any] = {"x_scale": "jac", "ftol": 1e-10, "xtol": 1e-10, "gtol": 1e-300, "max_nfev": most}
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Setting `gtol`", UserWarning)
+            # SciPy's types have no function for the derivatives
+            found = least_squares(residual, first, jacobian, (lower, upper), **rules)  # pyright: ignore[reportArgumentType]
         return state_at(found.x), bool(found.status > 0), int(found.nfev)
 
     def blur_of(self, state: State, noise: float) -> np.ndarray:

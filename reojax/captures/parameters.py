@@ -60,7 +60,7 @@ def parameter(robot: Robot, name: str) -> Parameter:
     if match is None or match[1] not in UNITS:
         fields = ", ".join(UNITS)
         raise ValueError(
-            f"there is no parameter {name!r}; there are end_inertia, rotor_inertia, gear_ratio, "
+            f"there is no parameter {shorten(name)}; there are end_inertia, rotor_inertia, gear_ratio, "
             f"inertia_scale[0] and entries such as "
             f"mass[1] or com[0,2] of the fields {fields}." + did_you_mean(text, ("end_inertia", *UNITS))
         )

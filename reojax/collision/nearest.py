@@ -14,6 +14,7 @@ from reojax.collision.clearance import pair_name, without_pairs
 from reojax.collision.path_clearance import path_clearance, posture_at
 from reojax.collision.placement import pair_ends
 from reojax.collision.segments import closest_parameters
+from reojax.mechanics.input_checks import check_path, check_robot
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -50,10 +51,11 @@ def nearest_parts(robot: Robot, path: Path, *, tolerance: float = 1e-4) -> Neare
     Raises:
         ValueError: as `path_clearance`, and for a robot that has no pairs of shapes.
     """
+    check_path(check_robot(robot), path)
     if not robot.collision_pairs:
         raise ValueError(without_pairs(robot))
     with jax.enable_x64(True):
-        robot, path = jax.tree.map(lambda leaf: np.asarray(leaf, float), (robot, path))
+        robot, path = jax.tree.map(lambda leaf: np.array(leaf, float), (robot, path))
         least = path_clearance(robot, path, tolerance=tolerance)
         theta = np.asarray(posture_at(path.waypoints, least.at), float)
         pair = int(least.pair)

@@ -196,7 +196,7 @@ class Problem:
 
     def starts(self, count: int, *, seed: int = 0) -> Float[np.ndarray, "m n"]:
         """Random designs within the bounds, loops within the joint limits."""
-        rng = np.random.default_rng(seed)
+        count, rng = checks.whole("count", count), np.random.default_rng(checks.seed(seed))
         x = rng.uniform(self.space.lower, self.space.upper, (count, len(self.space.lower)))
         for loop in self.loops:
             x[:, self.space.place(loop.variable.name)] = loop.random(rng, count)

@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array
-from reojax._internal.checks import numbers
 from reojax.robot import Robot
 
 RELATIVE = ("mass", "inertia", "rotor_inertia", "gear_ratio")
@@ -38,13 +38,16 @@ def sources_of(robot: Robot, tolerances: Mapping[str, ArrayLike]) -> Sources:
         ValueError: for an unknown field, a negative tolerance, or the wrong number of them.
     """
     names, deviations, fields = [], [], []
+    checks.mapping("tolerances", tolerances, "names of fields to standard deviations")
     for field, given in tolerances.items():
         if field not in RELATIVE + ABSOLUTE:
-            raise ValueError(f"there are no tolerances for {field!r}; they are for {', '.join(RELATIVE + ABSOLUTE)}.")
+            known = ", ".join(RELATIVE + ABSOLUTE)
+            near = checks.did_you_mean(field, RELATIVE + ABSOLUTE)
+            raise ValueError(f"there are no tolerances for {checks.shorten(field)}; they are for {known}.{near}")
         count = len(getattr(robot, field))
-        values = numbers(field, np.broadcast_to(given, (count,)) if np.ndim(given) == 0 else given, (count,))
-        if (values < 0).any():
-            raise ValueError(f"the tolerance of {field!r} is {given}; it must not be negative.")
+        entry, one = f"tolerances[{field!r}]", checks.rank(given) == 0
+        values = np.broadcast_to(checks.numbers(entry, given, () if one else (count,)), (count,))
+        checks.refuse(entry, values, values < 0, "it must not be negative")
         fields.append((field, tuple(values.tolist())))
         parts = {"com": (".x", ".y", ".z"), "anchor": (".x", ".y", ".z"), "axis": (".tilt1", ".tilt2")}.get(
             field, ("",)

@@ -18,9 +18,11 @@ from numpy.typing import ArrayLike
 
 from reojax import so3
 from reojax._internal import checks
-from reojax._internal.arrays import Array
+from reojax._internal.arrays import Array, common_float
+from reojax._internal.precision import in_double, warn_if_single
 from reojax.design.tolerances import Sources, across, perturb, sources_of
 from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation
+from reojax.mechanics.input_checks import check_path, check_robot, check_steps
 from reojax.mechanics.own_units import without_names
 from reojax.path import Path
 from reojax.robot import Robot
@@ -82,6 +84,7 @@ class Spread(NamedTuple):
     frame: str
 
 
+@in_double
 def sensitivities(robot: Robot, path: Path, *, frame: Frame = "start", steps: int = DEFAULT_STEPS) -> Sensitivities:
     """Differentiate the net rotation by every number of the robot that has an effect on it.
 
@@ -95,6 +98,8 @@ def sensitivities(robot: Robot, path: Path, *, frame: Frame = "start", steps: in
         ValueError: for an unknown frame, and as `net_rotation`.
     """
     _check_frame(frame)
+    check_path(check_robot(robot), path)
+    steps = check_steps("steps", steps)
     slopes, rotation = _slopes(without_names(robot), path, steps)
     rows = list(_rows(robot, slopes))
     derivative = np.stack([row[2] for row in rows])
@@ -142,7 +147,9 @@ def spread(
     from reojax.sweeps import sweep, zipped
 
     _check_frame(frame)
-    checks.whole("draws", draws, 2)
+    draws, seed = checks.whole("draws", draws, 2), checks.seed(seed)
+    check_path(check_robot(robot), path)
+    steps = check_steps("steps", steps)
     sources = sources_of(robot, tolerances)
     nominal = net_rotation(robot, path, steps=steps)
     jacobian = np.asarray(_jacobian(without_names(robot), path, sources, steps))  # (3, k)
@@ -174,8 +181,11 @@ def scatter(robot: Robot, path: Path, tolerances: Mapping[str, ArrayLike], *, st
     """Mean square of the turn by the linear rule [rad^2], for use as an objective: traced, robot and path alike.
 
     The trace of `Spread.covariance`, with derivatives by the errors as central differences over a hundredth of their
-    standard deviations, so that its own gradient needs first derivatives only. Right to 1e-8 relative or so.
+    standard deviations, so that its own gradient needs first derivatives only. Right to 1e-8 relative or so in float64;
+    in float32 it warns, as a tenth may be lost.
     """
+    check_path(check_robot(robot), path)
+    warn_if_single("differences of a hundredth of a tolerance are not resolved", common_float(robot, path))
     sources, step = sources_of(robot, tolerances), 1e-2
     errors = step * jnp.concatenate([jnp.eye(len(sources.name)), -jnp.eye(len(sources.name))])
     turned = jax.vmap(lambda error: net_rotation(perturb(robot, sources, error), path, steps=steps))(errors)
@@ -223,5 +233,4 @@ def _rows(robot: Robot, slopes: Robot) -> Iterator[tuple[str, str, np.ndarray, f
 
 
 def _check_frame(frame: str) -> None:
-    if frame not in ("start", "end"):
-        raise ValueError(f"`frame` is {frame!r}; it must be 'start' or 'end'.")
+    checks.one_of("frame", frame, ("start", "end"))

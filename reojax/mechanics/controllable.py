@@ -83,7 +83,7 @@ def controllable_directions(
     shares = np.append((np.arange(_STEPS)[:, None] + _GAUSS) / _STEPS, 1.0)
     shapes = np.concatenate([np.zeros((1, count)), (shares[:, None, None] * ray).reshape(-1, count)])
     with jax.enable_x64(True):
-        double = jax.tree.map(lambda leaf: np.asarray(leaf, float), without_names(robot))
+        double = jax.tree.map(lambda leaf: np.array(leaf, float), without_names(robot))
         terms = _terms(double, theta + shapes @ moves.T)
     gamma, slope, field = (np.asarray(part) for part in terms)
     gamma, i, k = gamma @ moves, *np.triu_indices(count, 1)

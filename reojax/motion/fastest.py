@@ -7,6 +7,7 @@ held where it is wanted. Answers are local optima near their starts.
 
 from collections.abc import Sequence
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +26,7 @@ from reojax.path import Path
 from reojax.robot import Robot
 
 
+@in_double
 def overlap(
     robot: Robot,
     path: Path,
@@ -83,11 +85,12 @@ def overlap(
     high = np.concatenate([np.full(2 * count, 1.5 * total), np.full(joints, 2.0), [1.5 * total]])
     low[-1] = 0.2 * total
     scale = np.concatenate([np.full(2 * count, 0.2 * total), np.full(joints, 0.3), [total]])
-    goal = net_rotation(robot, path)
+    goal = net_rotation(*_doubled(robot, path))
     task = Task(robot, check_motors(motors, robot), goal, False, build, lambda x: x[-1], order, apart)
     return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
 
+@in_double
 def free_law(
     robot: Robot,
     path: Path,
@@ -142,7 +145,7 @@ def free_law(
     high = np.concatenate([3 * durations, np.full(edges * points, 1.2)])
     scale = np.concatenate([0.5 * durations, np.full(edges * points, 0.3)])
     cost = lambda x: x[:edges].sum()
-    goal = net_rotation(robot, path)
+    goal = net_rotation(*_doubled(robot, path))
     task = Task(robot, check_motors(motors, robot), goal, True, build, cost, lambda x: x[:0], apart)
     return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
@@ -201,7 +204,7 @@ def fastest_loop(
         inner = x[knots:].reshape(knots - 1, joints)
         return through(Path(jnp.concatenate([ends, inner, ends])), x[:knots])
 
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(checks.seed(seed))
     reach = np.minimum(np.asarray(robot.upper), np.pi) - np.maximum(np.asarray(robot.lower), -np.pi)
     first = np.tile(np.concatenate([np.full(knots, total / knots), places[1:-1].ravel()]), (starts, 1))
     first[1:, knots:] += 0.05 * rng.normal(size=(starts - 1, first.shape[1] - knots)) * np.tile(reach, knots - 1)
@@ -217,6 +220,11 @@ def _apart(robot: Robot, margin: float | None, postures: dict[str, np.ndarray]) 
     if margin is None:
         return None
     return Apart(*check_clearance(robot, margin, postures))
+
+
+def _doubled(robot: Robot, path: Path) -> tuple[Robot, Path]:
+    """Both in float64, whatever they were made of."""
+    return jax.tree.map(lambda leaf: np.array(leaf, float), (robot, path))
 
 
 def _check_moves(path: Path, entry: str = "path") -> None:

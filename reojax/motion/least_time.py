@@ -202,6 +202,7 @@ def _able(motors: Motor | Sequence[Motor], robot: Robot) -> Motor:
 
 
 def _check_fit(robot: Robot, trajectory: Trajectory) -> None:
+    checks.instance("trajectory", trajectory, Trajectory, "`along` or `through` make")
     if trajectory.joints != robot.joints:
         raise ValueError(f"`path` moves {trajectory.joints} joints; {robot.name!r} has {robot.joints} joints.")
 

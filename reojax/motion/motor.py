@@ -94,11 +94,13 @@ class Drive(NamedTuple):
 
 def stall_torque(motor: Motor) -> float | Array:
     """Torque at standstill under the full supply, `k supply / resistance` [N m]."""
+    motor = _motor(motor)
     return motor.torque_constant * motor.supply / motor.resistance
 
 
 def no_load_speed(motor: Motor) -> float | Array:
     """Speed without a load under the full supply, own drag and friction included [rad/s]."""
+    motor = _motor(motor)
     k, resistance = motor.torque_constant, motor.resistance
     return (motor.supply - resistance * motor.friction / k) / (k + resistance * motor.drag / k)
 
@@ -187,10 +189,23 @@ def check_motors(motors: Motor | Sequence[Motor], robot: Robot, *, compare: bool
     return Motor(**columns)
 
 
+def _motor(motor: Any) -> Motor:
+    """Return one motor, or many of one shape, its numbers those that a motor can have."""
+    checks.instance("motor", motor, Motor, "`RE_MAX_17`")
+    return Motor(*(_possible(field, as_numbers(f"motor.{field}", value)) for field, value in motor._asdict().items()))
+
+
 def _column(field: str, value: Any, robot: Robot) -> Array:
-    array = as_numbers(field, value)
+    array = as_numbers(f"motors.{field}", value)
     if array.shape not in ((), (robot.joints,)):
         raise ValueError(f"motors.{field} has shape {array.shape}; it must be one number or ({robot.joints},).")
+    array = _possible(field, array)
+    xp = np if isinstance(array, np.ndarray | np.floating) else jnp
+    return xp.broadcast_to(array, (robot.joints,))
+
+
+def _possible(field: str, array: Array) -> Array:
+    """Return the numbers if a motor can have them, or they are traced."""
     if is_concrete(array):
         rule, kept = "positive", array > 0
         if field in ("drag", "friction", "rotor_inertia"):
@@ -200,9 +215,9 @@ def _column(field: str, value: Any, robot: Robot) -> Array:
         if field == "gear_ratio":
             rule, kept = "other than zero", array != 0
         if not np.all(kept & (np.isfinite(array) | (field == "continuous_torque"))):
-            raise ValueError(f"motors.{field} is {np.asarray(array).tolist()}; it must be {rule}, and a finite number.")
-    xp = np if isinstance(array, np.ndarray | np.floating) else jnp
-    return xp.broadcast_to(array, (robot.joints,))
+            shown = checks.shorten(np.asarray(array).tolist())
+            raise ValueError(f"motors.{field} is {shown}; it must be {rule}, and a finite number.")
+    return array
 
 
 def _compare(field: str, motors: Array, robot: Array) -> None:

@@ -73,6 +73,7 @@ def release_spread(
             fast for the steps.
     """
     checks.whole("draws", draws)
+    checks.key("key", key)
     if steps is not None:
         checks.whole("steps", steps)
     aim = Release() if expected is None else expected

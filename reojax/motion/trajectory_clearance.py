@@ -68,7 +68,7 @@ def trajectory_clearance(robot: Robot, trajectory: Trajectory, *, tolerance: flo
         raise ValueError("`trajectory` has numbers that are not finite.")
     powers = powers * length[:, None, None] ** np.arange(powers.shape[1])[None, :, None]  # of the share of a piece
     with jax.enable_x64(True):
-        robot = jax.tree.map(lambda leaf: np.asarray(leaf, float), robot)
+        robot = jax.tree.map(lambda leaf: np.array(leaf, float), robot)
         geometry = unit_axes(geometry_of(robot), np.dtype(float))
         per_angle = np.asarray(moved_per_angle(structure_of(robot), geometry))
         begin, off = _stretches(powers, per_angle, near / 2)

@@ -46,6 +46,7 @@ def descend(
     Raises:
         ValueError: as `optimise`.
     """
+    checks.function("cost", cost, *(("x",) if data is None else ("x", "data")))
     x, box = check_starts(starts, lower, upper, None, data)
     checks.whole("steps", steps)
     check_tolerances(rate=rate, slope_tolerance=slope_tolerance)

@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from reojax._internal.arrays import Array
+from reojax._internal.checks import shorten
 
 Function = Callable[..., Any]
 _BLOCK, _VALUES_BLOCK = 8, 16
@@ -51,14 +52,14 @@ class Functions(NamedTuple):
     def parts(self) -> list[Callable[[Array, Any], Any]]:
         """Functions of x and data to lists of costs, of equalities and of inequalities, each with what it has."""
         call = lambda f, x, data: f(x, data) if self.with_data else f(x)
-        one = lambda f, x, data: [jnp.asarray(call(f, x, data))]
+        one = lambda entry, f, x, data: [_array(entry, call(f, x, data))]
         if self.together is not None:
             together = self.together
             return [lambda x, data: tuple([jnp.asarray(array)] for array in call(together, x, data))]
         return [
-            lambda x, data: (one(self.cost, x, data), [], []),
-            *(lambda x, data, f=f: ([], one(f, x, data), []) for f in self.equality),
-            *(lambda x, data, f=f: ([], [], one(f, x, data)) for f in self.inequality),
+            lambda x, data: (one("cost", self.cost, x, data), [], []),
+            *(lambda x, data, f=f: ([], one("equality", f, x, data), []) for f in self.equality),
+            *(lambda x, data, f=f: ([], [], one("inequality", f, x, data)) for f in self.inequality),
         ]
 
 
@@ -159,6 +160,13 @@ def _alone(function: Function, x: Array, data: Any) -> Any:
     """One start in a block of its own, which takes less compilation than `vmap`."""
     answer = function(x[0], jax.tree.map(lambda leaf: leaf[0], data))
     return jax.tree.map(lambda leaf: leaf[None], answer)
+
+
+def _array(entry: str, value: Any) -> Array:
+    try:
+        return jnp.asarray(value)
+    except Exception as error:
+        raise ValueError(f"`{entry}` returns {shorten(value)}; it must return real floating-point numbers.") from error
 
 
 def _check(cost: list[Array], equality: list[Array], inequality: list[Array]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -13,6 +12,7 @@ from numpy.typing import ArrayLike
 from tqdm import tqdm
 
 from reojax._internal import checks
+from reojax._internal.precision import warn_user
 from reojax._internal.progress import label
 from reojax.optimisation.arguments import check_starts, check_tolerances
 from reojax.optimisation.functions import Function, Functions, Programs
@@ -103,7 +103,11 @@ def optimise(
         ValueError: naming the argument, its value and the rule, for bounds the wrong way round, a start outside,
             wrong shapes, a cost that is not a real scalar or constraints that are not real vectors.
     """
-    functions = Functions(cost, _several(equality), _several(inequality), data is not None)
+    check_starts(starts, lower, upper, scale, data)
+    takes = ("x",) if data is None else ("x", "data")
+    checks.function("cost", cost, *takes)
+    both = _several("equality", equality, takes), _several("inequality", inequality, takes)
+    functions = Functions(cost, *both, data is not None)
     return _run(functions, starts, lower, upper, data, scale, tolerance, slope_tolerance, max_steps, progress)
 
 
@@ -141,10 +145,9 @@ def _run(
     check_tolerances(tolerance=tolerance, slope_tolerance=slope_tolerance)
     checks.whole("max_steps", max_steps)
     if x.dtype == np.float32 and tolerance < _LEAST_SINGLE:
-        warnings.warn(
-            f"`tolerance` is {tolerance:g}, which single precision seldom meets: switch double precision on by "
-            'jax.config.update("jax_enable_x64", True), or ask for 1e-5.',
-            stacklevel=3,
+        warn_user(
+            f"`tolerance` is {tolerance:g}, which single precision, JAX's default, seldom meets: switch double "
+            'precision on by jax.config.update("jax_enable_x64", True) before anything is computed, or ask for 1e-5.'
         )
     programs = Programs(functions, x, data)
     problem = Problem(
@@ -162,10 +165,13 @@ def _run(
     return _solution(ended, box.lower, box.upper, box.scale, x.dtype)
 
 
-def _several(functions: Function | Sequence[Function] | None) -> tuple[Function, ...]:
+def _several(
+    entry: str, functions: Function | Sequence[Function] | None, takes: tuple[str, ...]
+) -> tuple[Function, ...]:
     if functions is None:
         return ()
-    return (functions,) if callable(functions) else tuple(functions)
+    listed = [functions] if callable(functions) else checks.listing(entry, functions, "functions")
+    return tuple(checks.function(f"{entry}[{i}]", function, *takes) for i, function in enumerate(listed))
 
 
 def _solution(ended: Iterates, lower: np.ndarray, upper: np.ndarray, scale: np.ndarray, dtype: np.dtype) -> Solution:

@@ -217,7 +217,7 @@ def free_paths(
         raise ValueError(f"`repeats` is {repeats!r} and `end` is not `start`; only a closed path can be run again.")
 
     with jax.enable_x64(True):
-        robot = jax.tree.map(lambda leaf: np.asarray(leaf, float), robot)
+        robot = jax.tree.map(lambda leaf: np.array(leaf, float), robot)
         clear = None
         if clearance is not None:
             postures = {"the posture at the start": freedom.start, "the posture at the end": freedom.end}

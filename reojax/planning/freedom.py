@@ -109,7 +109,7 @@ def _limits(
 
 
 def _per_joint(robot: Robot, entry: str, value: ArrayLike) -> np.ndarray:
-    shape = () if np.ndim(value) == 0 else (robot.joints,)
+    shape = () if checks.rank(value) == 0 else (robot.joints,)
     return np.broadcast_to(checks.numbers(entry, value, shape, finite=False), (robot.joints,))
 
 

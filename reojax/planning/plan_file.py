@@ -143,7 +143,7 @@ def _certificate(robot: Robot, waypoints: np.ndarray) -> dict[str, float] | None
     if not np.abs(np.diff(waypoints, axis=0)).any():
         return None
     with jax.enable_x64(True):
-        robot = jax.tree.map(lambda leaf: np.asarray(leaf, float), robot)
+        robot = jax.tree.map(lambda leaf: np.array(leaf, float), robot)
         found = certify(robot, polygon(waypoints))
         return {name: float(value) for name, value in found._asdict().items()}
 
@@ -188,6 +188,7 @@ def _from_json(data: dict[str, Any]) -> SavedPlan:
         raise ValueError(f"travel is {travel:.6g}, but the joints move through {moved:.6g} rad.")
     if not isinstance(top["converged"], bool):
         raise ValueError(f"converged is {checks.shorten(top['converged'])}; it must be true or false.")
+    manoeuvres = checks.listing("manoeuvres", top.get("manoeuvres", ()), "manoeuvres")
     clearance = None
     if "clearance" in top:
         distance = entries("clearance", top["clearance"], ("distance",))["distance"]
@@ -202,7 +203,7 @@ def _from_json(data: dict[str, Any]) -> SavedPlan:
         travel=travel,
         converged=top["converged"],
         status=_text("status", top["status"]),
-        manoeuvres=tuple(_manoeuvre(k, row) for k, row in enumerate(top.get("manoeuvres", ()))),
+        manoeuvres=tuple(_manoeuvre(k, row) for k, row in enumerate(manoeuvres)),
         certificate=_read_certificate(top["certificate"]),
         clearance=clearance,
         reojax=_text("reojax", top["reojax"]),

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from reojax._internal.checks import number
 from reojax.capsules import Capsule
 from reojax.robot import Robot, make_robot
 from reojax.robots.parts import Solid, cylinder
@@ -42,7 +43,7 @@ def two_cylinder_cat(axial_to_transverse: float) -> Robot:
     Raises:
         ValueError: if the ratio is outside these bounds.
     """
-    ratio = float(axial_to_transverse)
+    ratio = number("axial_to_transverse", axial_to_transverse)
     if not 0 < ratio < 2:
         raise ValueError(f"`axial_to_transverse` is {axial_to_transverse}; a cylinder has it above 0 and below 2.")
     length = _RADIUS * np.sqrt(6 / ratio - 3)  # axial m r^2 / 2, transverse m (3 r^2 + l^2) / 12

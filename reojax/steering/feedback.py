@@ -96,14 +96,17 @@ def Steering(
             or single < 0
             or (single == 0 and entry not in ("wander", "drag_std"))
         ):
-            raise ValueError(f"`{entry}` is {value!r}; it must be one positive number.")
-    chosen = tuple(parameter(robot, p) if isinstance(p, str) else p for p in parameters)
+            raise ValueError(f"`{entry}` is {checks.shorten(value)}; it must be one positive number.")
+    listed = checks.listing("parameters", parameters, "names and `Parameter`s")
+    chosen = tuple(parameter(robot, p) if isinstance(p, str) else p for p in listed)
     if not all(isinstance(p, Parameter) for p in chosen):
-        raise ValueError(f"`parameters` is {parameters!r}; each must be a name or a Parameter.")
-    if len(parameters_std) != len(chosen):
-        raise ValueError(f"`parameters_std` has {len(parameters_std)} numbers for {len(chosen)} parameters.")
-    spread = np.broadcast_to(np.asarray(as_numbers("momentum_std", momentum_std)), (3,))
-    std = np.concatenate([np.zeros(3), spread, [drag_std], np.asarray(parameters_std, float)])
+        raise ValueError(f"`parameters` is {checks.shorten(parameters)}; each must be a name or a Parameter.")
+    own = checks.numbers("parameters_std", parameters_std, (-1,))
+    if len(own) != len(chosen):
+        raise ValueError(f"`parameters_std` has {len(own)} numbers for {len(chosen)} parameters.")
+    one = checks.rank(momentum_std) == 0
+    spread = np.broadcast_to(checks.numbers("momentum_std", momentum_std, () if one else (3,)), (3,))
+    std = np.concatenate([np.zeros(3), spread, [drag_std], own])
     if not (np.isfinite(std) & (std >= 0)).all():
         raise ValueError(f"standard deviations must be finite and not negative; they are {std[3:].tolist()}.")
     keep = None if clearance is None else keep_of(robot, trajectory, clearance)

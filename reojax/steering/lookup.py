@@ -101,6 +101,7 @@ def righting_table(
         ValueError: naming the entry, its value and the rule; or if the motion of the middle is not found.
     """
     goal = checks.rotations("target", target)
+    momenta = checks.listing("momenta", momenta, "three axes of a grid")
     if len(momenta) != 3:
         raise ValueError(f"`momenta` has {len(momenta)} axes; it must have 3, one for each component.")
     axes = tuple(np.asarray(checks.numbers(f"momenta[{k}]", axis, (-1,))) for k, axis in enumerate(momenta))

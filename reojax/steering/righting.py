@@ -81,7 +81,7 @@ def righting(
             beyond reason, which is likely in another unit.
     """
     goal = checks.rotations("target", target)
-    momenta = np.asarray(momentum)[None] if np.ndim(momentum) == 1 else momentum
+    momenta = checks.numbers("momentum", momentum, (3,))[None]
     many = _righting(robot, goal[None], momenta, duration, start, end, motors, clearance, weights, pieces, starts,
                      tolerance, max_steps, seed, shorten)  # fmt: skip
     return Righting(*(field[0] for field in many))
@@ -110,11 +110,11 @@ def righting_many(
 
     Every field of the result has a leading axis m. Other arguments and errors as for `righting`.
     """
-    given = np.asarray(momenta, float)
-    goals = np.asarray(targets)
-    if goals.ndim == 2:
-        goals = np.broadcast_to(goals, (len(np.atleast_2d(given)), 3, 3))
-    goals = checks.rotations("targets", goals, (-1, 3, 3))
+    given = checks.numbers("momenta", momenta, (-1, 3))
+    if checks.rank(targets) == 2:
+        goals = np.broadcast_to(checks.rotations("targets", targets), (len(given), 3, 3))
+    else:
+        goals = checks.rotations("targets", targets, (-1, 3, 3))
     return _righting(robot, goals, given, duration, start, end, motors, clearance, weights, pieces, starts, tolerance,
                      max_steps, seed, shorten)  # fmt: skip
 
@@ -128,7 +128,7 @@ def _righting(robot, goals, momenta, duration, start, end, motors, clearance, we
     if duration is None and motors is None:
         raise ValueError("`duration` is None, the shortest that is found; without `motors` there is none.")
     seconds = 0.5 if duration is None else checks.positive("duration", duration, "s")
-    h = np.asarray(checks.numbers("momentum", momenta, (-1, 3)))
+    h = momenta
     if len(h) != len(goals):
         raise ValueError(f"`momenta` has {len(h)} rows for {len(goals)} targets.")
     task, pieces = task_of(robot, h, seconds, start, end, motors, clearance, weights, pieces)

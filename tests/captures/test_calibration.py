@@ -185,3 +185,15 @@ def test_captures_that_cannot_be_used(exact):
     few = reojax.make_capture(capture.time[:2], capture.theta[:2], capture.rotation[:2])
     with pytest.raises(ValueError, match="2 frames with an orientation cannot determine 6 numbers"):
         calibrate_function(robot, few, PAIR)
+
+
+def test_a_capture_in_which_nothing_moves_tells_nothing():
+    """Slopes of exactly 0, from which SciPy's steps are no numbers: the fit ends there, and says what is not known."""
+    time = np.linspace(0, 1, 12)
+    still = reojax.make_capture(time, np.zeros((12, 3)), np.broadcast_to(np.eye(3), (12, 3, 3)))
+    for noise, clock in ((None, False), (1e-300, True), (0.5, True)):
+        fit = reojax.calibrate(robots.prototype(), still, joint_noise=noise, clock=clock)
+        assert np.isfinite(fit.values).all()
+        assert np.isfinite(fit.offset)
+        assert not any(fit.identifiable)
+        assert "no effect" in fit.warning

@@ -25,6 +25,8 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--minutes", type=float, default=1e9, help="stop after that time")
     parser.add_argument("--resume", type=Path, help="file that what was done is kept in, to go on from")
+    parser.add_argument("--like", type=Path, help="such a file of another version: without the inputs it left out")
+    parser.add_argument("--slowest", type=int, help="longest time of one input [s]; default 60")
     parser.add_argument("--package", type=Path, help="folder that `reojax` is imported from")
     args = parser.parse_args()
     sys.path[0:1] = [*([str(args.package.resolve())] if args.package else []), str(Path(__file__).parents[1])]
@@ -33,27 +35,38 @@ def main() -> int:
     import jax
 
     jax.config.update("jax_enable_x64", True)
+    from fuzz import tally
     from fuzz.kinds import LONG, source
     from fuzz.tally import KINDS, Tally
+
+    if args.slowest:
+        tally.SLOWEST = args.slowest
+    sys.stdout = os.fdopen(os.dup(1), "w")  # whatever somebody closes
+    like = json.loads(args.like.read_text()) if args.like else {}
 
     kept = args.resume.resolve() if args.resume else None
     done = json.loads(kept.read_text()) if kept and kept.exists() else {}
     os.chdir(tempfile.mkdtemp())
     end = time.monotonic() + 60 * args.minutes
     for kind in args.kind or LONG:
-        tally, before = Tally(), done.setdefault(kind, {"found": []})
+        told, before = Tally(), done.setdefault(kind, {"seen": 0, "left out": [], "found": []})
         inputs, wanted = source(kind, args.seed), args.count or int(LONG[kind] * args.share)
-        if inputs is None or before.get("tried", 0) >= wanted:
+        if inputs is None or before["seen"] >= wanted:
             continue
-        for what, call in islice(inputs, before.get("tried", 0), wanted):
-            tally.judge(what, call)
-            if tally["tried"] % 500 == 0:
+        absent = set(like.get(kind, before)["left out"])
+        for index, (what, call) in islice(enumerate(inputs), before["seen"], wanted):
+            before["seen"] += 1
+            if call is None:
+                before["left out"].append(index)
+            elif index not in absent:
+                told.judge(what, call)
+            if index % 500 == 0:
                 jax.clear_caches()
             if time.monotonic() > end:
                 break
-        for key, number in tally.items():
+        for key, number in told.items():
             before[key] = before.get(key, 0) + number
-        before["found"] += tally.found
+        before["found"] += told.found
         if kept:
             kept.write_text(json.dumps(done, indent=1))
         if time.monotonic() > end:

@@ -25,6 +25,8 @@ LONGEST = 2000
 SLOWEST = 60
 """Longest time of one input, compiling included [s]."""
 KINDS = ("refused by name", "fine", "wrong", "from inside", "hung")
+_MAY_BE_NONE = {"Righting": ("margin", "least_duration", "clearance")}
+"""What is documented to be NaN where it was not asked for."""
 _OWN = (str(Path(reojax.__file__).parent), str(Path(__file__).parent))
 
 
@@ -75,7 +77,12 @@ class Tally(Counter[str]):
 
     @staticmethod
     def _sane(result: Any) -> tuple[str, str]:
-        leaves = [np.asarray(x) for x in jax.tree.leaves(result) if isinstance(x, float | np.ndarray | jax.Array)]
+        parts = result._asdict() if hasattr(result, "_asdict") else result
+        if isinstance(parts, dict):
+            parts = {
+                name: part for name, part in parts.items() if name not in _MAY_BE_NONE.get(type(result).__name__, ())
+            }
+        leaves = [np.asarray(x) for x in jax.tree.leaves(parts) if isinstance(x, float | np.ndarray | jax.Array)]
         if isinstance(result, reojax.Comparison):  # NaN is what was not measured
             leaves = [np.asarray(result.offset), result.simulated_theta, result.simulated_rotation]
         if any(np.isnan(x).any() for x in leaves if x.dtype.kind == "f"):
