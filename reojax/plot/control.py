@@ -8,10 +8,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.drawing.colours import ANGLES, INK, JOINTS
 from reojax.mechanics.attitude import tilt_and_roll
 from reojax.motion.closed_loop import Tracking
+from reojax.plot._asked import asked
 from reojax.plot._style import dress, legend_above
 from reojax.robot import Robot
 
@@ -59,6 +61,7 @@ def tracking_figure(
     return figure
 
 
+@asked
 def bandwidth_figure(bandwidth: ArrayLike, lag: dict[str, np.ndarray], chosen: dict[str, float]) -> Figure:
     """Draw RMS errors of the joints against the controllers' bandwidth, and the ones that were chosen.
 
@@ -67,6 +70,10 @@ def bandwidth_figure(bandwidth: ArrayLike, lag: dict[str, np.ndarray], chosen: d
         lag: for each controller, RMS errors [rad].
         chosen: for each controller, the tuned bandwidth [rad/s].
     """
+    along = checks.numbers("bandwidth", bandwidth, (-1,))
+    for name, values in lag.items():
+        checks.numbers(f"lag[{name!r}]", values, (len(along),))
+        checks.number(f"chosen[{name!r}]", chosen.get(name))
     figure = Figure(figsize=(6.4, 4.2), layout="constrained", facecolor="white")
     axes = figure.subplots()
     for (name, values), colour in zip(lag.items(), JOINTS, strict=False):

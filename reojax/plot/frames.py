@@ -10,11 +10,13 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+from reojax._internal import checks
 from reojax._internal.arrays import as_numbers
 from reojax.drawing.colours import INK
 from reojax.drawing.view import View
 from reojax.mechanics.holonomy import rotation_history
 from reojax.path import Path
+from reojax.plot._asked import asked
 from reojax.plot.robots import draw_axes, draw_robot, faces_at_pose
 from reojax.robot import Robot
 
@@ -28,6 +30,7 @@ class Frames(NamedTuple):
     """Rotation of the base, base components to inertial ones."""
 
 
+@asked
 def frames_along(robot: Robot, path: Path, *, per_edge: int = 1) -> Frames:
     """Poses of a robot along a path at zero momentum: at every corner, and `per_edge - 1` between two corners.
 
@@ -42,6 +45,7 @@ def frames_along(robot: Robot, path: Path, *, per_edge: int = 1) -> Frames:
     return Frames(theta, rotation)
 
 
+@asked
 def draw_frames(
     axes: Sequence[Axes3D],
     robot: Robot,
@@ -77,6 +81,7 @@ def draw_frames(
     return axes
 
 
+@asked
 def frames_figure(
     robot: Robot,
     path: Path,
@@ -123,6 +128,7 @@ def frames_figure(
 
 def check_frames(robot: Robot, frames: Frames) -> Frames:
     """Poses as arrays of float64, or a ValueError if they do not fit the robot."""
+    checks.instance("frames", frames, Frames, "`frames_along` makes")
     theta, rotation = (np.asarray(as_numbers(name, x), float) for name, x in zip(Frames._fields, frames, strict=True))
     if theta.ndim != 2 or theta.shape[1] != robot.joints or not len(theta) or not np.isfinite(theta).all():
         raise ValueError(f"`theta` has shape {theta.shape}; for {robot.name!r} it must be (m, {robot.joints}), finite.")

@@ -11,12 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.collision.nearest import nearest_parts
 from reojax.drawing.colours import ANGLES, DASHES, INK, JOINTS
 from reojax.mechanics.attitude import LEVEL, tilt_and_roll, zxz_without_jumps
 from reojax.mechanics.holonomy import rotation_history
 from reojax.path import Path
+from reojax.plot._asked import asked
 from reojax.plot._style import dress_path
 from reojax.plot.nearest import draw_nearest, mark_nearest
 from reojax.robot import Robot
@@ -28,6 +30,7 @@ _SAMPLES = 64
 _EULER = (("first, about z", "#009e73"), ("second, about x", "#cc79a7"), ("third, about z", "#56b4e9"))
 
 
+@asked
 def draw_orientation(
     axes: Axes, rotations: Float[Array, "m 3 3"], *, edges: int, angles: Literal["tilt", "zxz"] = "tilt"
 ) -> Axes:
@@ -47,8 +50,7 @@ def draw_orientation(
     history = np.asarray(rotations, float)
     if history.ndim != 3 or history.shape[1:] != (3, 3) or len(history) < 2:
         raise ValueError(f"`rotations` has shape {history.shape}; it must be (m, 3, 3), two or more.")
-    if angles not in ("tilt", "zxz"):
-        raise ValueError(f"`angles` is {angles!r}; it must be 'tilt' or 'zxz'.")
+    checks.one_of("angles", angles, ("tilt", "zxz"))
     along = np.linspace(0, edges, len(history))
     told = tilt_and_roll(history) if angles == "tilt" else zxz_without_jumps(history)
     for (label, colour), values in zip(ANGLES if angles == "tilt" else _EULER, told.T, strict=True):
@@ -63,6 +65,7 @@ def draw_orientation(
     return axes
 
 
+@asked
 def draw_joints(axes: Axes, robot: Robot, path: Path) -> Axes:
     """Draw the joint angles of a robot along a path, in degrees; x counts the path's edges.
 
@@ -80,6 +83,7 @@ def draw_joints(axes: Axes, robot: Robot, path: Path) -> Axes:
     return axes
 
 
+@asked
 def history_figure(
     robot: Robot,
     path: Path,

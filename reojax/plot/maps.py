@@ -10,9 +10,11 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
+from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.drawing.colours import GREY, INK, PALE
 from reojax.drawing.view import View
+from reojax.plot._asked import asked
 from reojax.plot.robots import draw_robot_flat, faces_at_pose
 from reojax.robot import Robot
 
@@ -21,6 +23,7 @@ LINES = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", INK)
 _MARKERS = "osD^vPX"
 
 
+@asked
 def draw_map(
     axes: Axes,
     x: ArrayLike,
@@ -52,6 +55,12 @@ def draw_map(
         raise ValueError(f"`values` has shape {z.shape}; x {columns.shape} and y {rows.shape} make it (rows, columns).")
     if not np.isfinite(z).all():
         raise ValueError("`values` must be finite everywhere.")
+    if checks.rank(levels) == 0:
+        levels = checks.whole("levels", levels, 1, 1000)
+    else:
+        levels = checks.numbers("levels", levels, (-1,))
+        if len(levels) < 2 or not (np.diff(levels) > 0).all():
+            raise ValueError(f"`levels` is {checks.shorten(levels)}; it must be two or more numbers that increase.")
     style: dict[str, Any] = {"cmap": "cividis"}
     if diverging:
         size = max(np.abs(z if isinstance(levels, int) else levels).max(), 1e-300)
@@ -69,6 +78,7 @@ def draw_map(
     return axes
 
 
+@asked
 def draw_loop(axes: Axes, corners: ArrayLike, *, label: str | None = None) -> Axes:
     """Draw a path in a plane of shape space over a map of it, with an arrow on every edge.
 
@@ -91,6 +101,7 @@ def draw_loop(axes: Axes, corners: ArrayLike, *, label: str | None = None) -> Ax
     return axes
 
 
+@asked
 def draw_lines(
     axes: Axes, x: ArrayLike, values: ArrayLike, *, labels: Sequence[str], points: Sequence[int] | slice | None = None
 ) -> Axes:
@@ -124,6 +135,7 @@ def draw_lines(
     return axes
 
 
+@asked
 def draw_poses(
     axes: Axes,
     robots: Robot | Sequence[Robot],
@@ -154,7 +166,10 @@ def draw_poses(
     if turns.ndim != 4 or turns.shape != (len(rows), len(columns), 3, 3):
         raise ValueError(f"`rotations` has shape {turns.shape}; the labels make it {len(rows), len(columns), 3, 3}.")
     count = len(rows) * len(columns)
-    each = [robots] * count if isinstance(robots, Robot) else list(robots)
+    each = [robots] * count if isinstance(robots, Robot) else checks.listing("robots", robots, "robots")
+    each = [checks.instance(f"robots[{i}]", robot, Robot, "`make_robot` makes") for i, robot in enumerate(each)]
+    if texts is not None and not (checks.rank(texts) == 2 and np.shape(texts) == (len(rows), len(columns))):
+        raise ValueError(f"`texts` is {checks.shorten(texts)}; it must be {len(rows)} rows of {len(columns)} words.")
     if len(each) != count:
         raise ValueError(f"there are {len(each)} robots for {count} rotations.")
     view = View() if view is None else view

@@ -5,15 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from reojax._internal import checks
 from reojax._internal.display_units import RPM
 from reojax.drawing.colours import ANGLES, DASHES, GREY, INK, JOINTS
 from reojax.mechanics.attitude import tilt_and_roll
 from reojax.motion.motor import Motor
 from reojax.motion.simulation import Motion
+from reojax.plot._asked import asked
 from reojax.plot._style import dress, legend_above
 from reojax.robot import Robot
 
 
+@asked
 def torque_speed_figure(
     motor: Motor,
     runs: Sequence[tuple[str, Motion]],
@@ -36,6 +39,11 @@ def torque_speed_figure(
     Raises:
         ValueError: if a motion has no motors.
     """
+    for i, run in enumerate(runs):
+        if not (isinstance(run, tuple | list) and len(run) == 2 and isinstance(run[1], Motion)):
+            raise ValueError(f"runs[{i}] is {checks.shorten(run)}; it must be a title and a Motion.")
+    if not runs:
+        raise ValueError("`runs` is empty; it must have a title and a Motion for each panel.")
     figure = Figure(figsize=(9.0 if len(runs) > 1 else 7.2, 4.1 * -(-len(runs) // 2) + 0.5), layout="constrained")
     panels = figure.subplots(-(-len(runs) // 2), min(len(runs), 2), squeeze=False, sharex=True, sharey=True)
     shown = range(len(joint_names)) if joints is None else joints
@@ -76,6 +84,7 @@ def torque_speed_figure(
     return figure
 
 
+@asked
 def motion_figure(robot: Robot, motion: Motion, *, title: str | None = None) -> Figure:
     """Draw a motion by time: orientation of the base, joint angles, joint rates and joint torques.
 

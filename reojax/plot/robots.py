@@ -21,10 +21,12 @@ from reojax.drawing.capsules import capsule_faces
 from reojax.drawing.colours import INK, link_colour
 from reojax.drawing.solids import Faces, joint_faces, link_faces
 from reojax.drawing.view import View, check_view, default_view
+from reojax.plot._asked import asked
 from reojax.plot._light import shade
 from reojax.robot import Robot
 
 
+@asked
 def draw_robot(
     axes: Axes3D,
     robot: Robot,
@@ -80,6 +82,7 @@ def draw_robot(
     return axes
 
 
+@asked
 def draw_robot_flat(
     axes: Axes,
     robot: Robot,
@@ -108,19 +111,21 @@ def draw_robot_flat(
     """
     view = default_view(robot) if view is None else view
     check_view(view)
+    size = checks.numbers("scale", scale, () if checks.rank(scale) == 0 else (2,))
     faces, colours = faces_at_pose(robot, theta, rotation)
     camera = view.camera()
     seen = faces @ camera.T
     towards = np.cross(seen[:, 2] - seen[:, 0], seen[:, 3] - seen[:, 1])[:, 2] > 0
     order = np.flatnonzero(towards)[np.argsort(seen[towards, :, 2].mean(1))]
     rgb = shade(faces, colours, view)[order]
-    polygons = seen[order][:, :, :2] * np.broadcast_to(scale, 2) + np.asarray(at, float)
+    polygons = seen[order][:, :, :2] * np.broadcast_to(size, 2) + _vector("at", at, 2)
     body = PolyCollection(list(polygons), facecolors=rgb, edgecolors=rgb, linewidths=0.3, alpha=alpha, zorder=2)
     body.set_gid(f"robot {robot.name}")
     axes.add_collection(body, autolim=False)
     return axes
 
 
+@asked
 def draw_axes(axes: Axes3D, length: float, *, at: ArrayLike = (0.0, 0.0, 0.0), names: Sequence[str] = "xyz") -> Axes3D:
     """Draw the directions x, y and z as lines of `length` [m] with their names at the ends."""
     corner = _vector("at", at, 3)
@@ -141,7 +146,7 @@ def faces_at_pose(robot: Robot, theta: ArrayLike, rotation: ArrayLike | None = N
     turned, origin = poses(robot, _vector("theta", theta, robot.joints))
     base = np.eye(3) if rotation is None else np.asarray(as_numbers("rotation", rotation), float)
     if base.shape != (3, 3) or not np.isfinite(base).all() or np.abs(base @ base.T - np.eye(3)).max() > 1e-3:
-        raise ValueError(f"`rotation` is {base.tolist()}; it must be a rotation matrix, (3, 3).")
+        raise ValueError(f"`rotation` is {checks.shorten(base)}; it must be a rotation matrix, (3, 3).")
     faces, colours = [], []
     links, pins = _parts(robot)
     for link, own in enumerate(links):
@@ -202,5 +207,5 @@ def _show(axes: Axes3D, points: np.ndarray) -> None:
 def _vector(entry: str, value: Any, length: int) -> np.ndarray:
     vector = np.asarray(as_numbers(entry, value), float)
     if vector.shape != (length,) or not np.isfinite(vector).all():
-        raise ValueError(f"`{entry}` is {vector.tolist()}; it must be {length} finite numbers.")
+        raise ValueError(f"`{entry}` is {checks.shorten(vector)}; it must be {length} finite numbers.")
     return vector

@@ -88,7 +88,7 @@ BAD = {
     "the labels make it (2, 2, 3, 3)": lambda axes: plot.draw_poses(axes, PROTOTYPE, TURNS, columns="ab", rows="de"),
     "1 robots for 6": lambda axes: plot.draw_poses(axes, [PROTOTYPE], TURNS, columns="abc", rows="de"),
     "must be (m, 3, 3)": lambda axes: plot.draw_orientation(axes, np.eye(3), edges=1),
-    "'tilt' or 'zxz'": lambda axes: plot.draw_orientation(axes, TURNS[0], edges=1, angles="xyz"),
+    "must be one of 'tilt', 'zxz'": lambda axes: plot.draw_orientation(axes, TURNS[0], edges=1, angles="xyz"),
     "has 3 joints": lambda axes: plot.draw_joints(axes, PROTOTYPE, reojax.polygon(np.zeros((2, 2)))),
 }
 
