@@ -22,8 +22,8 @@ from reojax.planning.free_polygons import ALONE, COARSE, Aim, Polygons
 from reojax.planning.freedom import Freedom
 from reojax.planning.polygon_table import PolygonTable
 
-_ROWS = 32
-"""Polygons solved side by side: one shape, one program."""
+_ROWS, _LEAST_ROWS = 32, 4
+"""Polygons solved side by side, at most and at least: few shapes, few programs."""
 _ROUNDS = 6
 """How often starts are tried for targets that are not reached."""
 _FINALISTS = 2
@@ -117,7 +117,7 @@ class Search:
 
         Without a `rounding` of the travel only the target counts; variables `held` (m, n) stay as they are.
         """
-        rows = 1 if len(self.freedom.start) > ALONE else min(_ROWS, max(8, 1 << (len(x) - 1).bit_length()))
+        rows = 1 if len(self.freedom.start) > ALONE else min(_ROWS, max(_LEAST_ROWS, 1 << (len(x) - 1).bit_length()))
         ends = np.stack([self.freedom.start, self.freedom.end])
         turning = axes is not None
         upper = self._high.copy()
