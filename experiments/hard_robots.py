@@ -89,7 +89,7 @@ def crude(robot: reojax.Robot, targets: np.ndarray, seed: int) -> list[float]:
             found = least_squares(
                 lambda x, k=k, target=target: np.ravel(one(x, last[k]) - target),
                 x[k] * limits * 0.999,
-                lambda x, k=k: np.asarray(slope(x, last[k])).reshape(9, -1),
+                lambda x, k=k: np.asarray(slope(x, last[k])).reshape(9, -1),  # pyright: ignore[reportArgumentType]
                 bounds=(-limits, limits),
             )
             least = min(least, float(apart(np.asarray(one(found.x, last[k]))[None], target[None])[0]))

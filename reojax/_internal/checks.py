@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -87,7 +88,7 @@ def seed(value: Any) -> int:
 def key(entry: str, value: Any) -> Any:
     """Return one key of `jax.random`, of either kind."""
     dtype = value.dtype if isinstance(value, jax.Array | np.ndarray) else None
-    typed = dtype is not None and jax.dtypes.issubdtype(dtype, jax.dtypes.prng_key) and not value.shape
+    typed = dtype is not None and jnp.issubdtype(dtype, jax.dtypes.prng_key) and not value.shape
     raw = dtype == np.uint32 and value.shape == jax.eval_shape(lambda: jax.random.key_data(jax.random.key(0))).shape
     if not (typed or raw):
         raise ValueError(f"`{entry}` is {shorten(value)}; it must be one key, as `jax.random.key(0)` makes.")

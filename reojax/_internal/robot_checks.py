@@ -1,6 +1,5 @@
 """The door of `make_robot`: plain numbers in, checked NumPy arrays out, or a `ValueError`."""
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -11,6 +10,7 @@ from reojax._internal.capsule_checks import check_capsules, check_pairs, default
 from reojax._internal.checks import index_of, listing, numbers, refuse, shorten
 from reojax._internal.definiteness import check_energy
 from reojax._internal.inertias import NOISE, breaks_triangle
+from reojax._internal.precision import warn_user
 
 _TOLERANCE = 1e-6
 """Relative rounding allowed in unit lengths, symmetry and the triangle rule (float32 data pass)."""
@@ -94,14 +94,13 @@ def _couplings(value: Any, names: tuple[str, ...]) -> dict[str, Any]:
     return {"couplings": tuple(pairs), "coupling_ratio": both[:, 0].copy(), "coupling_offset": both[:, 1].copy()}
 
 
-def _ask_for_degrees(lower: np.ndarray, upper: np.ndarray, names: Sequence[str]) -> None:
+def ask_for_degrees(lower: np.ndarray, upper: np.ndarray, names: Sequence[str]) -> None:
     """Warn of limits of more than four turns: they are legal, and mostly degrees."""
     for entry, limits in (("lower", lower), ("upper", upper)):
         for k in map(int, np.flatnonzero(np.isfinite(limits) & (np.abs(limits) > _MANY_TURNS))):
-            warnings.warn(
+            warn_user(
                 f"{entry}[{k}] ({names[k]}) is {limits[k]:g} rad, {abs(limits[k]) / (2 * np.pi):.1f} turns: "
-                "are these degrees? Limits are in rad.",
-                stacklevel=4,
+                "are these degrees? Limits are in rad."
             )
             return
 
@@ -140,7 +139,7 @@ def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str,
     lower = per_joint("lower", -np.inf, finite=False)
     upper = per_joint("upper", np.inf, finite=False)
     refuse("lower", lower, lower >= upper, "it must be below `upper`", " rad", joint_names)
-    _ask_for_degrees(lower, upper, joint_names)
+    ask_for_degrees(lower, upper, joint_names)
     if not isinstance(name, str):
         raise ValueError(f"`name` is {shorten(name)}; it must be a string.")
     fields = {

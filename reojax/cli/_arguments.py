@@ -24,7 +24,10 @@ class Parser(argparse.ArgumentParser):
         known = [*OPTIONS] if wrong and wrong[3] else re.findall(r"[\w-]+", wrong[2]) if wrong else []
         near = difflib.get_close_matches(wrong[1] or wrong[3], known, 1, 0.6) if wrong else []
         message = message if len(message) <= 500 else f"{message[:350]} ... {message[-100:]}"
-        raise BadInput(f"{self.prog}: {message}" + (f"; did you mean {near[0]}?" if near else ""))
+        hint = f"; did you mean {near[0]}?" if near else ""
+        if wrong and near and near[0] == wrong[3]:
+            hint = "; it is an option of other commands"
+        raise BadInput(f"{self.prog}: {message}{hint}")
 
     def add_argument(self, *names: Any, **options: Any) -> argparse.Action:
         """Declare an argument, and remember the option's name for whoever mistypes it."""

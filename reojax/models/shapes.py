@@ -13,6 +13,8 @@ from reojax.models import capsule_fit
 from reojax.models.capsule_fit import Fit
 from reojax.models.description import Shape
 
+_LARGEST_SIZE = 1e6
+"""Of a shape [m]; more is a mistake, and its volume soon no number."""
 LARGEST = 64 * 2**20
 """Largest mesh file that is read [bytes]."""
 ABOVE = 5
@@ -52,6 +54,8 @@ def _fit(shape: Shape, folder: Path) -> tuple[list[Fit], float]:
     size = np.array(shape.size)
     if shape.kind in ("sphere", "cylinder", "capsule", "box", "ellipsoid") and not (size > 0).all():
         raise ValueError(f"a {shape.kind} without extent")
+    if not (np.abs(size) <= _LARGEST_SIZE).all():
+        raise ValueError(f"a {shape.kind:.20} larger than {_LARGEST_SIZE:g} m")
     if shape.kind == "sphere":
         return [Fit(np.zeros(3), np.zeros(3), float(size[0]))], 4 / 3 * np.pi * size[0] ** 3
     if shape.kind == "capsule":

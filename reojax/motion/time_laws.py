@@ -15,7 +15,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import Array, as_numbers, is_concrete
-from reojax._internal.checks import shorten
+from reojax._internal.checks import did_you_mean, shorten
 from reojax.motion.splines import least_jerk
 
 
@@ -90,7 +90,9 @@ def by_name(name: str) -> Law:
         ValueError: if `name` is not in `LAWS`.
     """
     if name not in LAWS:
-        raise ValueError(f"there is no time law named {shorten(name)}; the names are {', '.join(LAWS)}.")
+        raise ValueError(
+            f"there is no time law named {shorten(name)}; the names are {', '.join(LAWS)}.{did_you_mean(name, LAWS)}"
+        )
     return LAWS[name]()
 
 

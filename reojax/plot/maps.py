@@ -58,12 +58,13 @@ def draw_map(
     if checks.rank(levels) == 0:
         levels = checks.whole("levels", levels, 1, 1000)
     else:
-        levels = checks.numbers("levels", levels, (-1,))
-        if len(levels) < 2 or not (np.diff(levels) > 0).all():
-            raise ValueError(f"`levels` is {checks.shorten(levels)}; it must be two or more numbers that increase.")
+        on = checks.numbers("levels", levels, (-1,))
+        if len(on) < 2 or not (np.diff(on) > 0).all():
+            raise ValueError(f"`levels` is {checks.shorten(on)}; it must be two or more numbers that increase.")
+        levels = on.tolist()
     style: dict[str, Any] = {"cmap": "cividis"}
     if diverging:
-        size = max(np.abs(z if isinstance(levels, int) else levels).max(), 1e-300)
+        size = max(np.abs(z if isinstance(levels, int) else np.array(levels)).max(), 1e-300)
         style = {"cmap": "PuOr", "vmin": -size, "vmax": size}
     if np.ptp(z) <= 1e-9 * max(np.abs(z).max(), 1.0):
         levels = np.array([-1.0, 1.0]) * max(np.abs(z).max(), 1.0)

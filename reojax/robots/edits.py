@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from reojax._internal.arrays import as_numbers, is_concrete, kind_of_arrays
 from reojax._internal.capsule_checks import check_capsules, check_pairs, default_pairs
 from reojax._internal.checks import index_of, instance, refuse, shorten
+from reojax._internal.robot_checks import ask_for_degrees
 from reojax.capsules import Capsule
 from reojax.robot import Robot
 
@@ -133,6 +134,7 @@ def with_limits(
         refuse(
             "lower", np.asarray(low), ~(np.asarray(low) < high), "it must be below `upper`", " rad", robot.joint_names
         )
+        ask_for_degrees(np.asarray(low), np.asarray(high), robot.joint_names)
     return robot.replace(lower=low, upper=high)
 
 

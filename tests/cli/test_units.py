@@ -2,7 +2,7 @@
 
 import pytest
 
-from reojax.cli import parse
+from reojax.cli import main, parse
 from reojax.cli._numbers import in_degrees
 
 
@@ -33,3 +33,12 @@ def test_targets_need_no_quotes(words):
 
 def test_vectors_may_begin_with_a_minus():
     assert parse(["simulate", "--momentum", "-0.001,0,0"]).momentum is not None
+
+
+def test_an_option_of_another_command_is_not_taken_for_a_slip(capsys):
+    assert main(["time", "--momentum", "-0.001,0,0"]) == 2
+    told = capsys.readouterr().err
+    assert "did you mean" not in told
+    assert "other commands" in told
+    assert main(["simulate", "--law", "quintik"]) == 2
+    assert "Did you mean 'quintic'?" in capsys.readouterr().err

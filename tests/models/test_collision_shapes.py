@@ -123,3 +123,15 @@ def test_meshes_of_a_package_are_found_beside_the_file(tmp_path):
         (capsule,) = robot.capsules
         assert 0.2 <= capsule.radius < 0.25
         np.testing.assert_allclose(np.abs(np.subtract(capsule.start, capsule.end)).max(), 2, atol=0.35)
+
+
+def test_a_shape_of_no_size_that_can_be_meant_is_left_out(tmp_path):
+    """Its volume would be no number."""
+    pytest.importorskip("mujoco")
+    from fuzz.damage import MJCF
+
+    file = tmp_path / "r.xml"
+    file.write_text(MJCF.replace('size="0.1 0.2"', 'size="1e308 0.2"'))
+    robot = load_robot(file)
+    assert not robot.capsules
+    assert any("larger than" in note for note in robot.notes)

@@ -64,3 +64,10 @@ def test_links_are_edited_by_name():
 def test_edits_refuse_by_name(edit, words):
     with pytest.raises(ValueError, match=words):
         edit()
+
+
+def test_limits_in_degrees_are_asked_about():
+    """As `make_robot` does; and the robot is made all the same."""
+    with pytest.warns(UserWarning, match="are these degrees"):
+        limited = robots.with_limits(robots.prototype(), -170.0, 170.0)
+    assert limited.upper[0] == 170.0
