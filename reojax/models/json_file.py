@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 
 from reojax._internal.arrays import is_concrete
-from reojax._internal.checks import instance, shorten
+from reojax._internal.checks import shorten
 from reojax._internal.files import check_ending, write_json
 from reojax._internal.json_files import entries, items, plain_number, read_object
 from reojax.capsules import Capsule
 from reojax.manoeuvres import Layout, check_layout
+from reojax.mechanics.input_checks import check_robot
 from reojax.robot import Robot, make_robot
 
 FORMAT, VERSION = "reojax robot", 1
@@ -51,7 +52,7 @@ def to_json(robot: Robot) -> dict[str, Any]:
     Raises:
         ValueError: if it is none that `make_robot` would make.
     """
-    instance("robot", robot, Robot, "`make_robot` makes")
+    check_robot(robot)
     if not is_concrete(robot):
         raise ValueError("`robot` is traced; files are written outside of jit, vmap and grad.")
     rows: dict[str, list[dict[str, Any]]] = {

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._internal.arrays import as_numbers, is_concrete, kind_of_arrays
-from reojax._internal.checks import index_of, instance, shorten
+from reojax._internal.checks import index_of, shorten
 from reojax.manoeuvres import Layout
+from reojax.mechanics.input_checks import check_robot
 from reojax.robot import Robot
 
 _ROUNDING = 1e-9
@@ -33,7 +34,7 @@ def with_joint_locked(robot: Robot, joint: str | int, angle: ArrayLike = 0.0) ->
         ValueError: if there is no such joint, it follows another one, the angle is not finite, or a joint would be held
             outside of its limits.
     """
-    instance("robot", robot, Robot, "`make_robot` makes")
+    check_robot(robot)
     index = index_of("joint", joint, robot.joint_names, "joint")
     for follower, driver in robot.couplings:
         if follower == index:

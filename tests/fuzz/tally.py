@@ -55,7 +55,7 @@ class Tally(Counter[str]):
 
     def _verdict(self, call: Callable[[], Any]) -> tuple[str, str]:
         before = signal.signal(signal.SIGALRM, _stop)
-        signal.alarm(SLOWEST)
+        signal.setitimer(signal.ITIMER_REAL, SLOWEST, 1)  # again, where somebody has swallowed it
         begin = time.monotonic()
         try:
             with warnings.catch_warnings():
@@ -72,7 +72,7 @@ class Tally(Counter[str]):
         except Exception as error:
             return "from inside", f"{type(error).__name__}: {str(error)[:150]}"
         finally:
-            signal.alarm(0)
+            signal.setitimer(signal.ITIMER_REAL, 0)
             signal.signal(signal.SIGALRM, before)
 
     @staticmethod

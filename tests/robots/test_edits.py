@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 
-from reojax import Capsule, design, robots
+from reojax import Capsule, design, robots, save_robot
 
 ARM = robots.satellite_arm()
 
@@ -71,3 +71,10 @@ def test_limits_in_degrees_are_asked_about():
     with pytest.warns(UserWarning, match="are these degrees"):
         limited = robots.with_limits(robots.prototype(), -170.0, 170.0)
     assert limited.upper[0] == 170.0
+
+
+def test_a_stack_of_robots_is_refused_by_name(tmp_path):
+    stacked = jax.tree.map(lambda leaf: np.stack([leaf, leaf]), robots.prototype())
+    for use in (robots.with_joint_locked, lambda robot, _: save_robot(robot, tmp_path / "a.json")):
+        with pytest.raises(ValueError, match=r"`robot.mass` has shape \(2, 4\)"):
+            use(stacked, 0)
