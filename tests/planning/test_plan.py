@@ -28,9 +28,11 @@ def lopsided(robot: reojax.Robot) -> reojax.Robot:
     return robot.replace(mass=mass, com=com, inertia=inertia)
 
 
-def planted(rng: np.random.Generator, loops: int, count: int) -> np.ndarray:
-    """Rotations after `loops` random manoeuvres."""
+def planted(rng: np.random.Generator, loops: int, count: int, bent: bool = False) -> np.ndarray:
+    """Rotations after `loops` random manoeuvres, that bend to a limit if `bent`."""
     letters, x = rng.integers(2, size=(count, loops)), rng.uniform(-1, 1, (2, count, loops))
+    if bent:
+        x[1] = np.sign(x[1])
     twist, bend = LIMITS["twist_limit"] * x[0], LIMITS["bend_limit"] * x[1]
     last = np.where(letters == 0, -twist, twist)
     corners = [word_corners(reojax.FOUR_BODY, *row) for row in zip(twist, bend, last, strict=True)]
@@ -70,6 +72,14 @@ def test_what_some_manoeuvres_made_takes_no_more(loops):
     assert plan.manoeuvres.max() <= loops
     more = PLAN(targets)
     assert (more.manoeuvres <= loops).all()
+
+
+@pytest.mark.parametrize("loops", [3, 5])
+def test_what_is_barely_within_reach_is_reached(loops):
+    """Targets that take all the bending there is, many of which no fewer loops reach."""
+    plan = PLAN(planted(np.random.default_rng(3), loops, 24, bent=True), max_manoeuvres=loops)
+    assert plan.converged.all()
+    assert plan.manoeuvres.max() <= loops
 
 
 def test_identity_half_turns_and_small_turns():
