@@ -15,10 +15,12 @@ from reojax.planning.candidates import Candidates, Context, attempt
 
 _KEPT, _CHILDREN = 6, 16
 """Words kept from one generation to the next, and variations of each."""
-_GENERATIONS, _PATIENCE = 60, 4
-"""Most generations, and those in a row without a better word after which a target is left."""
-_BETTER = 0.9
-"""Part of the squared residual that a better word may leave."""
+_GENERATIONS = 120
+"""Most generations."""
+_PATIENCE, _BETTER = {False: 4, True: 20}, {False: 0.9, True: 0.99}
+"""Generations in a row without a better word after which a target is left, and the part of the squared residual that a
+better word may leave: with loops that are run once, and with loops that are run many times, where the words are many
+more and come nearer little by little."""
 _BENT, _TWISTED = 0.9, 0.25
 """Share of the bends and of the twists drawn anew that are at a limit."""
 _ALIKE = 1e-4
@@ -42,15 +44,16 @@ def vary(context: Context, targets: np.ndarray, known: Sequence[Candidates], slo
 
 def _vary(context: Context, targets: np.ndarray, known: Candidates, slots: int, most: int) -> Candidates:
     rng = np.random.default_rng(0)
+    again = most > slots
     blank = np.arange(len(known.letter)) >= slots
     best = _best(known)
     owners = np.unique(best.owner)
     least, stalled = np.full(len(owners), np.inf), np.zeros(len(owners), int)
     for _ in range(_GENERATIONS):
         now = best.square[np.searchsorted(best.owner, owners)]
-        stalled = np.where(now < _BETTER * least, 0, stalled + 1)
+        stalled = np.where(now < _BETTER[again] * least, 0, stalled + 1)
         least = np.minimum(now, least)
-        going = owners[(now > _DONE) & (stalled < _PATIENCE)]
+        going = owners[(now > _DONE) & (stalled < _PATIENCE[again])]
         if not len(going):
             break
         parents = best.take(np.flatnonzero(np.isin(best.owner, going)))
@@ -76,11 +79,13 @@ def _variations(
     drawn = (_rank(parents.owner)[:, None] * _CHILDREN + np.arange(_CHILDREN)).ravel()  # the same for every target
     letter, new, x, moved = (field[..., drawn] for field in (letter, new, x, moved))
     there = child.letter >= 0
-    new &= there | (np.where(there, child.runs, 0).sum(0) + slots <= most)  # no more loops than are allowed
+    often = np.floor((most / slots) ** rng.random((slots, n)))[:, drawn] if most > slots else np.ones(new.shape)
+    runs = np.where(new, often, np.where(there, child.runs, 0.0))
+    new &= runs.sum(0) <= most  # no more loops than are allowed
     letter = np.where(new, letter, child.letter)
     low, high = (np.moveaxis(edge[letter], -1, 0) for edge in context.box[1:])
     x = np.clip(np.where(new[None], x, child.x + moved), low, high)
-    runs = np.where(new, 1.0, child.runs)
+    runs = np.where(new, often, child.runs)
     return child._replace(
         letter=letter, x=np.where(letter >= 0, x, 0.0), runs=runs, square=np.full(len(child.owner), np.inf)
     )
