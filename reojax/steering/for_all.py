@@ -12,6 +12,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
+from reojax._internal.precision import in_double
 from reojax.motion.motor import Motor
 from reojax.optimisation.status import Status
 from reojax.robot import Robot
@@ -41,6 +42,7 @@ class RightingForAll(NamedTuple):
     """The same of the motion that `righting` finds for the mean momentum alone, the best of those tried [rad]."""
 
 
+@in_double
 def righting_for_all(
     robot: Robot,
     target: ArrayLike,
@@ -60,7 +62,8 @@ def righting_for_all(
 ) -> RightingForAll:
     """Find one motion whose mean square miss of the target, over all momenta that a release may leave, is least.
 
-    Starts are the motions that `righting` finds for the mean momentum; from each, Levenberg-Marquardt steps go down.
+    Starts are the motions that `righting` finds for the mean momentum; from each, Levenberg-Marquardt steps go down,
+    and back by so much that the limits hold.
     What momentum does cannot be undone without knowing it: `integral of R A^-1 R^T` is positive definite, so a spread
     always leaves a miss, which a motion in wide postures makes small. To take back the rest, there is `Steering`.
 

@@ -15,13 +15,15 @@ from reojax._internal.arrays import Array
 from reojax._internal.linalg import cholesky, cholesky_solve
 from reojax.steering.end import end_and_slope
 from reojax.steering.free_points import free_points
-from reojax.steering.limits import Task, bounds, conditions_and_slopes, states
+from reojax.steering.limits import FEASIBLE, Task, bounds, conditions_and_slopes, states
 from reojax.steering.newton import STEPS, Answer, effort_form, judged, rows_at_steps
 
 _PRICE = 1e4
 """Of the square of a limit that is passed, against the mean square of the miss."""
 _EFFORT = 1e-6
 """Of the effort, which decides where the miss does not."""
+_BACK = (1.0, 0.99, 0.97, 0.94, 0.88, 0.75, 0.5, 0.0)
+"""Shares of the way from the start that are judged: less than all where the end is beyond a limit."""
 
 
 class _State(NamedTuple):
@@ -92,13 +94,20 @@ def _solve_one(task: Task, pieces: int, max_steps: int | Array, points, goal, mo
         return jax.tree.map(lambda a, b: jnp.where(better, a, b), found, kept)
 
     s = jax.lax.fori_loop(0, max_steps, step, _State(x, *around(x), jnp.asarray(1e-2, dtype)))
-    points = variables.of(s.x)
 
-    def judge(h: Array) -> Answer:
-        return judged(task, pieces, points, goal, h, duration, jnp.asarray(max_steps))
+    def judge(share: Array) -> tuple[Answer, Array]:
+        """At the mean momentum, by the worst of all; and the angles that they leave."""
+        points = variables.of(x + share * (s.x - x))
+        every = jnp.concatenate([(shares @ momenta)[None], momenta])
+        each = jax.vmap(lambda h: judged(task, pieces, points, goal, h, duration, jnp.asarray(max_steps)))(every)
+        mean = jax.tree.map(lambda leaf: leaf[0], each)
+        return mean._replace(beyond=each.beyond[1:].max()), each.error[1:]
 
-    each = jax.vmap(judge)(momenta)
-    return judge(shares @ momenta)._replace(beyond=each.beyond.max()), each.error
+    found = jax.lax.map(judge, jnp.asarray(_BACK, dtype))
+    answers, angles = found
+    within = answers.beyond <= FEASIBLE
+    best = jnp.argmin(jnp.where(within, angles**2 @ shares, 1e3 + answers.beyond))
+    return jax.tree.map(lambda leaf: leaf[best], found)
 
 
 def cubature(momentum: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

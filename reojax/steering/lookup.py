@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from reojax import so3
 from reojax._internal import checks
 from reojax._internal.arrays import Array
+from reojax._internal.precision import in_double
 from reojax.motion.motor import Motor
 from reojax.motion.trajectory import Trajectory
 from reojax.robot import Robot
@@ -64,6 +65,7 @@ class RightingTable(NamedTuple):
         return trajectory_through(self.at(momentum), float(self.duration))
 
 
+@in_double
 def righting_table(
     robot: Robot,
     target: ArrayLike,

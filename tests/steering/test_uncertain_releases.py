@@ -1,5 +1,6 @@
 """Righting where the momentum is not known beforehand: one motion for all, and a table to look motions up in."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -42,6 +43,18 @@ def test_one_motion_for_all_misses_less_than_that_for_the_mean():
     drawn = np.random.default_rng(0).multivariate_normal(MEAN, COVARIANCE, 12)
     others = [so3.angle(end_of(found.motion.trajectory, h).T @ TARGET) for h in drawn]
     assert 0.6 * found.rms < np.sqrt(np.mean(np.square(others))) < 1.5 * found.rms
+
+
+def test_a_single_try_keeps_to_the_limits():
+    """Where the least miss lies near them: converged means within, in float64 whatever JAX's default."""
+    with jax.enable_x64(False):
+        found = reojax.righting_for_all(ROBOT, TARGET, momentum=MEAN, covariance=COVARIANCE, duration=0.62, tries=1)
+    assert found.motion.points.dtype == np.float64
+    fine = np.asarray(jax.vmap(found.motion.trajectory.at)(np.linspace(0, 0.62, 400)).theta)
+    beyond = max((fine - np.asarray(ROBOT.upper)).max(), (np.asarray(ROBOT.lower) - fine).max())
+    assert fine.min() < ROBOT.lower.min() + 0.05
+    assert found.motion.converged
+    assert beyond < 3e-4
 
 
 def test_a_table_is_exact_at_its_corners_and_within_its_bound_between():
