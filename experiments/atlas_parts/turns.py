@@ -22,6 +22,7 @@ FEW = 5
 """Up to so many joints a search is cheap, and thorough."""
 THOROUGH, USUAL, QUICK = Effort(starts=4, steps=80), Effort(starts=2, steps=40), Effort(starts=1, steps=25)
 LAWS = ("quintic", "trapezoid")
+_LOST = "not found: no loop about this axis was found that keeps the clearance"
 
 
 def turns(subject: Subject, *, quick: bool = False) -> Row:
@@ -66,7 +67,7 @@ def _turn(subject: Subject, found: Turns, without: Turns, targets: np.ndarray, k
     """Cost and certificate of one turn; without a clearance it is given for what it would cost."""
     row: dict[str, Any] = {
         "reached": bool(found.reached[k]),
-        "status": str(found.status[k]),
+        "status": _LOST if not found.reached[k] and found.status[k] == "converged" else str(found.status[k]),
         "free": {
             "reached": bool(without.reached[k]),
             "runs": int(without.runs[k]),
