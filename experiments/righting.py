@@ -1,23 +1,28 @@
 """How surely, how fast and how exactly does `righting` turn a falling robot that already spins?
 
     python experiments/righting.py            # goes on where it was stopped; hours for all 500 of the quadruped
-    python experiments/righting.py --quick    # the prototype alone, few releases
+    python experiments/righting.py --releases 60 --cases quadruped
+    python experiments/righting.py --quick    # the prototype alone, without motors, few releases
 
 Random releases: any orientation (Haar), momenta that turn the straight robot by up to half a turn in the fall of
 0.62 s, about any axis. The prototype has to end in a given orientation, the quadruped with its feet down: its own yaw
 is free, so that the one nearest to where it would drift is taken, and half a turn from there where that fails. Both
 have their motors: the prototype's RE-max 17 at 12 V, the quadruped's brushless ones (chosen numbers, see `MOTORS`).
+The same releases without motors too, and those of the prototype in the least time that is found for its motors.
 The answers are replayed by MuJoCo's full dynamics where MuJoCo is installed (`righting_parts/dynamics.py`).
 """
 
 import importlib.util
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from common.script import options, run
 from scipy.spatial.transform import Rotation
+from scipy.special import ndtr
 
 import reojax
 from reojax import robots, so3
@@ -35,12 +40,36 @@ MOTORS = {
 CHUNK = 10
 
 
-def main(out: Path, *, quick: bool = False) -> dict:
+class Case(NamedTuple):
+    """What is asked of one robot."""
+
+    robot: str
+    motors: reojax.Motor | None
+    fall: float | None
+    """Duration [s]; None: the least that is found."""
+    pieces: int | None
+    """Of the spline."""
+    starts: int
+
+
+CASES = {
+    "prototype": Case("prototype", MOTORS["prototype"], FALL, None, 6),
+    "prototype without motors": Case("prototype", None, FALL, None, 24),
+    "prototype in its least time": Case("prototype", MOTORS["prototype"], None, None, 6),
+    "quadruped": Case("quadruped", MOTORS["quadruped"], FALL, 8, 6),
+    "quadruped without motors": Case("quadruped", None, FALL, 8, 6),
+}
+
+
+def main(out: Path, *, quick: bool = False, releases: int = 500, cases: Sequence[str] = tuple(CASES)) -> dict:
     """Run, print the table, write `righting.json` to `out`, and return the numbers."""
+    if releases < 1:
+        raise ValueError(f"--releases is {releases}; it must be 1 or more.")
     file = check_writable(out / "righting.json")
-    sizes = {"prototype": 6} if quick else {"prototype": 500, "quadruped": 500}
+    if quick:
+        releases, cases = 4, ["prototype without motors"]
     result = {}
-    for name, releases in sizes.items():
+    for name in cases:
         result[name] = _releases(out / "righting_parts", name, releases, file, result)
         print(name, result[name], flush=True)
     write_json(file, result)
@@ -49,21 +78,23 @@ def main(out: Path, *, quick: bool = False) -> dict:
 
 def _releases(folder: Path, name: str, releases: int, file: Path, before: dict) -> dict:
     """All releases of one robot, ten at a time; what is done is kept, and the table is written anew after each ten."""
-    robot = robots.by_name(name)
+    case = CASES[name]
+    robot = robots.by_name(case.robot)
     rng = np.random.default_rng(0)
     inertia = np.asarray(reojax.momentum_matrices(robot, np.zeros(robot.joints)).A)
-    axis = rng.normal(size=(releases, 3))
-    turn = rng.uniform(0, np.pi, (releases, 1)) * axis / np.linalg.norm(axis, axis=1, keepdims=True)
-    released = Rotation.from_quat(rng.normal(size=(releases, 4))).inv()  # upright, seen from where it is let go
-    targets = _feet_down(released, turn) if name == "quadruped" else released.as_matrix()[:, None]
+    draws = rng.normal(size=(releases, 8))  # fewer releases are the first of more
+    axis, size = draws[:, :3], ndtr(draws[:, 7:]) * np.pi
+    turn = size * axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    released = Rotation.from_quat(draws[:, 3:7]).inv()  # upright, seen from where it is let go
+    targets = _feet_down(released, turn) if case.robot == "quadruped" else released.as_matrix()[:, None]
     folder.mkdir(parents=True, exist_ok=True)
     rows: list[np.ndarray] = []
     row = {}
     for first in range(0, releases, CHUNK):
-        part = folder / f"{name}-{first}-{min(CHUNK, releases - first)}.npy"
+        part = folder / f"{name}-{first}-{min(CHUNK, releases - first)}.npy".replace(" ", "_")
         if not part.exists():
             take = range(first, min(first + CHUNK, releases))
-            np.save(part, [_one(robot, name, targets[k], turn[k] / FALL @ inertia) for k in take])
+            np.save(part, [_one(robot, case, targets[k], turn[k] / FALL @ inertia) for k in take])
         rows.append(np.load(part))
         row = _summary(np.concatenate(rows))
         write_json(file, before | {name: row})
@@ -81,14 +112,14 @@ def _feet_down(released: Rotation, turn: np.ndarray) -> np.ndarray:
     return np.stack([least @ drift, least @ drift @ np.diag([-1.0, -1.0, 1.0])], axis=1)
 
 
-def _one(robot: reojax.Robot, name: str, targets: np.ndarray, momentum: np.ndarray) -> tuple[float, ...]:
-    """Reached, error, margin, travel, processor time, angle of the replay, angle asked for."""
+def _one(robot: reojax.Robot, case: Case, targets: np.ndarray, momentum: np.ndarray) -> tuple[float, ...]:
+    """Reached, error, margin, travel, processor time, angle of the replay, angle asked for, duration."""
     begin = time.process_time()
-    pieces = 8 if name == "quadruped" else None
-    options = {"momentum": momentum, "duration": FALL, "motors": MOTORS[name], "pieces": pieces, "starts": 6}
-    found = reojax.righting(robot, targets[0], **options, shorten=False)
+    options = {"momentum": momentum, "duration": case.fall, "motors": case.motors, "pieces": case.pieces}
+    options |= {"starts": case.starts, "shorten": False}
+    found = reojax.righting(robot, targets[0], **options)
     if not found.converged and len(targets) > 1:
-        found = reojax.righting(robot, targets[1], **options, shorten=False)
+        found = reojax.righting(robot, targets[1], **options)
     seconds = time.process_time() - begin
     replayed = np.nan
     if found.converged and importlib.util.find_spec("mujoco"):
@@ -99,13 +130,14 @@ def _one(robot: reojax.Robot, name: str, targets: np.ndarray, momentum: np.ndarr
     drifted = Rotation.from_rotvec(np.linalg.solve(inertia, momentum) * FALL).as_matrix()
     asked = float(so3.angle(jnp.asarray(drifted.T @ targets[0])))
     known = (found.converged, found.error, found.margin, found.travel)
-    return *(float(x) for x in known), seconds, replayed, asked
+    return *(float(x) for x in known), seconds, replayed, asked, float(found.duration)
 
 
 def _summary(rows: np.ndarray) -> dict:
     good = rows[:, 0] == 1
     reached = rows[good]
     some = len(reached) > 0
+    driven = some and bool(np.isfinite(reached[:, 2]).all())
     by_angle = {}
     for low, high in ((0, 45), (45, 90), (90, 135), (135, 180)):
         inside = (np.rad2deg(rows[:, 6]) >= low) & (np.rad2deg(rows[:, 6]) < high + (high == 180))
@@ -114,8 +146,10 @@ def _summary(rows: np.ndarray) -> dict:
         "releases": len(rows),
         "reached": int(good.sum()),
         "largest_error_rad": float(reached[:, 1].max()) if some else None,
-        "motor_margin_median": float(np.median(reached[:, 2])) if some else None,
-        "motor_margin_least": float(reached[:, 2].min()) if some else None,
+        "motor_margin_median": float(np.median(reached[:, 2])) if driven else None,
+        "motor_margin_least": float(reached[:, 2].min()) if driven else None,
+        "duration_s_median": float(np.median(reached[:, 7])) if some else None,
+        "duration_s_percentiles_10_90": np.quantile(reached[:, 7], [0.1, 0.9]).tolist() if some else None,
         "travel_median_rad": float(np.median(reached[:, 3])) if some else None,
         "processor_s_median": float(np.median(rows[:, 4])),
         "processor_s_percentile_95": float(np.quantile(rows[:, 4], 0.95)),
@@ -126,4 +160,7 @@ def _summary(rows: np.ndarray) -> dict:
 
 
 if __name__ == "__main__":
-    run(main, options(__doc__))
+    parser = options(__doc__)
+    parser.add_argument("--releases", type=int, default=500, help="how many of each case (default 500)")
+    parser.add_argument("--cases", nargs="+", choices=CASES, default=list(CASES), help="which cases (default: all)")
+    run(main, parser)
