@@ -154,8 +154,12 @@ def least(rows: Candidates, value: np.ndarray, keep: int = 1) -> Candidates:
     """For each target the `keep` rows of least `value`."""
     order = np.lexsort((value, rows.owner))
     owner = rows.owner[order]
-    rank = np.arange(len(owner)) - np.searchsorted(owner, owner)
-    return rows.take(order[rank < keep])
+    return rows.take(order[rank_in_target(owner) < keep])
+
+
+def rank_in_target(owner: np.ndarray) -> np.ndarray:
+    """Place of each row among those of its target, where targets are in order."""
+    return np.arange(len(owner)) - np.searchsorted(owner, owner)
 
 
 def _on_table(context: Context, targets: np.ndarray, rows: Candidates, program: Callable[..., Iterate]) -> Iterate:

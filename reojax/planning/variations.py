@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from reojax.planning.candidates import Candidates, Context, attempt
+from reojax.planning.candidates import Candidates, Context, attempt, rank_in_target
 
 _KEPT, _CHILDREN = 6, 16
 """Words kept from one generation to the next, and variations of each."""
@@ -76,7 +76,8 @@ def _variations(
     new &= ~blank[:, None]
     moved = 0.1 * rng.normal(size=x.shape) * (rng.random(n) < 0.5)
     child = parents.take(np.repeat(np.arange(len(parents.owner)), _CHILDREN))
-    drawn = (_rank(parents.owner)[:, None] * _CHILDREN + np.arange(_CHILDREN)).ravel()  # the same for every target
+    # the same for every target
+    drawn = (rank_in_target(parents.owner)[:, None] * _CHILDREN + np.arange(_CHILDREN)).ravel()
     letter, new, x, moved = (field[..., drawn] for field in (letter, new, x, moved))
     there = child.letter >= 0
     often = np.floor((most / slots) ** rng.random((slots, n)))[:, drawn] if most > slots else np.ones(new.shape)
@@ -112,12 +113,7 @@ def _best_of(rows: Candidates) -> np.ndarray:
     owner, square = rows.owner[order], rows.square[order]
     alike = (np.diff(owner) == 0) & (np.diff(square) < _ALIKE * square[1:]) & (square[1:] > _DONE)
     order = order[~np.concatenate([[False], alike])]
-    return order[_rank(rows.owner[order]) < _KEPT]
-
-
-def _rank(owner: np.ndarray) -> np.ndarray:
-    """Place of each row among those of its target, where targets are in order."""
-    return np.arange(len(owner)) - np.searchsorted(owner, owner)
+    return order[rank_in_target(rows.owner[order]) < _KEPT]
 
 
 def _together(parts: Sequence[Candidates]) -> Candidates:
