@@ -2,8 +2,8 @@
 
     python experiments/design_opt.py                # under a minute on 2 quiet cores, compilation included
     python experiments/design_opt.py --target 120 --quick
-    python experiments/design_opt.py --clearance 5               # nothing touches: 5 mm, proven; and the motors keep up
-    python experiments/design_opt.py --robot quadruped --axis x --target 30 --clearance 5
+    python experiments/design_opt.py --clearance 5mm             # nothing touches, proven; and the motors keep up
+    python experiments/design_opt.py --robot satellite_arm --axis z --target 90 --clearance 10mm --motors 39,1.4
 
 First the prototype as it is, within 270/120: the best rectangle, polygon and smooth loop (spline) whose whole net
 rotation is the target, off-axis part included, each from 64 starts. Pinocchio replays the answers; derivatives are
@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from common.motors import motors_of
 from common.script import options, run
 from common.tables import gradient_error, least_travel, summary, table
 from design_opt_parts import any_robot, constrained
@@ -52,18 +53,21 @@ def main(
     axis: str = "z",
     clearance: float | None = None,
     robot: str = "prototype",
+    motors: tuple[float, float] | None = None,
 ) -> dict:
     """Print loops and trade-offs, write `design_opt` as .json, .png and .html (a page to look at)."""
     if not 0 < target < 360:
         raise ValueError(f"`--target` is {target:g}; it must be a turn between 0 and 360 degrees.")
-    if clearance is not None and not 0 <= clearance < 1e4:
-        raise ValueError(f"`--clearance` is {clearance:g}; it must be a distance from 0 up, in mm.")
+    if clearance is not None and not 0 <= clearance < 10:
+        raise ValueError(f"`--clearance` is {clearance:g} m; it must be a distance from 0 to 10 m.")
     picture, record = plot.check_picture(out / "design_opt.png"), check_writable(out / "design_opt.json")
     page = check_writable(out / "design_opt.html")
-    apart = None if clearance is None else 1e-3 * clearance
-    if robot != "prototype" or axis != "z":
-        return _any(any_robot.robot_of(robot), target, axis, apart, record, page, quick=quick)
-    loops = best_loops(np.deg2rad(target), quick=quick, clearance=apart)
+    if robot != "prototype" or axis != "z" or motors is not None:
+        asked = any_robot.robot_of(robot)
+        vector = np.deg2rad(target) * np.eye(3)["xyz".index(axis)]
+        case = any_robot.case_of(asked, vector, clearance, None if motors is None else motors_of(asked, *motors))
+        return _any(case, f"{target:g} deg about {axis}", record, page, quick=quick)
+    loops = best_loops(np.deg2rad(target), quick=quick, clearance=clearance)
     curves = trade_off(np.deg2rad(target), points=5 if quick else 13)
 
     print(f"\nPrototype turned by {target:g} deg of roll, all three components, least joint travel within 270/120\n")
@@ -85,12 +89,12 @@ def main(
         "loops": loops,
         "trade_off": curves,
     }
-    if apart is not None:
-        answer["constrained"] = choices = constrained.choices(np.deg2rad(target), apart, quick=quick)
+    if clearance is not None:
+        answer["constrained"] = choices = constrained.choices(np.deg2rad(target), clearance, quick=quick)
         print(
             "Amplitudes, end link inertia and gear ratio of manoeuvre A by gradients, under more and more conditions\n"
         )
-        columns = [key for key in choices[0] if key != "case"]
+        columns = [key for key in choices[0] if key not in ("case", "waypoints", "certificate")]
         table(["", *columns], [[row["case"], *(_plain(row[key]) for key in columns)] for row in choices], width=16)
         answer["converged"] &= all(row["converged"] for row in choices)
     plot.save(_picture(loops, curves, target), picture)
@@ -100,21 +104,20 @@ def main(
     return answer
 
 
-def _any(
-    robot: reojax.Robot, target: float, axis: str, clearance: float | None, record: Path, page: Path, *, quick: bool
-) -> dict:
+def _any(case: any_robot.Case, turn: str, record: Path, page: Path, *, quick: bool) -> dict:
     """The question for a robot of any kind."""
-    vector = np.deg2rad(target) * np.eye(3)["xyz".index(axis)]
-    rows, own = any_robot.solve(robot, vector, clearance, quick=quick)
-    print(f"\n{robot.name} turned by {target:g} deg about {axis}, all three components: least joint travel\n")
-    columns = [key for key in rows[0] if key != "case"]
-    table(["", *columns], [[row["case"], *(_plain(row[key]) for key in columns)] for row in rows])
-    replayed = own["replay_rad"]
-    print(f"\nreplayed by Pinocchio: {'missing' if replayed is None else f'{replayed:.1e} rad'}")
-    answer = {"target_deg": target, "axis": axis, "converged": all(r["converged"] > 0 for r in rows),
-              "choices": rows, "own": own}  # fmt: skip
+    rows, own = any_robot.solve(case, quick=quick)
+    print(f"\n{case.robot.name} turned by {turn}, all three components: least joint travel\n")
+    columns = ["converged", "starts", "travel_deg", "ends", "gears", *(["time_s"] if case.motors else [])]
+    proofs = ["clearance_m", "pinocchio_rad", "holds"]
+    table(["", *columns, *proofs], [
+        [row["case"], *(row[key] for key in columns), *(_plain(row["certificate"][key]) for key in proofs)]
+        for row in rows
+    ])  # fmt: skip
+    answer = {"turn": turn, "converged": all(row["certificate"]["holds"] for row in rows), "choices": rows, "own": own}
     write_json(record, answer)
-    reojax.view(robot, reojax.polygon(np.deg2rad(own["waypoints_deg"])), page, target=np.asarray(so3.exp(vector)))
+    target = np.asarray(so3.exp(case.target))
+    reojax.view(case.robot, reojax.polygon(np.deg2rad(own["waypoints_deg"])), page, target=target)
     print(f"wrote {record} and {page}")
     return answer
 
@@ -248,10 +251,29 @@ def _picture(loops: list[dict[str, Any]], curves: dict[str, dict[str, Any]], tar
     return figure
 
 
+def _length(text: str) -> float:
+    """Metres, of a length such as `5mm`; a bare number is in mm."""
+    for unit, size in (("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("", 1e-3)):
+        if text.endswith(unit):
+            return size * float(text.removesuffix(unit))
+    raise AssertionError(text)
+
+
+def _line(text: str) -> tuple[float, float]:
+    """Torque and speed, of `39,1.4`."""
+    torque, speed = map(float, text.split(","))
+    return torque, speed
+
+
 if __name__ == "__main__":
     parser = options(__doc__)
     parser.add_argument("--target", type=float, default=180.0, help="turn to reach [deg] (default: 180)")
     parser.add_argument("--axis", choices=("x", "y", "z"), default="z", help="axis of the turn (default: z, the roll)")
-    parser.add_argument("--clearance", type=float, metavar="MM", help="distance that the robot's parts keep [mm]")
+    parser.add_argument(
+        "--clearance", type=_length, metavar="LENGTH", help="what the robot's parts keep apart, such as 5mm"
+    )
     parser.add_argument("--robot", default="prototype", help="a robot's name, or a file (default: prototype)")
+    parser.add_argument(
+        "--motors", type=_line, metavar="TORQUE,SPEED", help="each joint's at standstill [N m] and without load [rad/s]"
+    )
     run(main, parser)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from any_robot_parts.files import folder_of
+from common.motors import motors_of
 
 import reojax
 from reojax import RE_MAX_17, Motor, robots
@@ -136,19 +137,5 @@ def subject(name: str) -> Subject:
     apart = np.asarray(reojax.clearance(robot, start))
     margin = min(entry.clearance, _SHARE * float(apart.min())) if apart.size else 0.0
     axes = {axis: np.array(vector) for axis, vector in entry.axes.items()}
-    motors = entry.motors if isinstance(entry.motors, Motor) else _motors(robot, entry.motors)
+    motors = entry.motors if isinstance(entry.motors, Motor) else motors_of(robot, *entry.motors)
     return Subject(name, robot, start, axes, margin, motors)
-
-
-def _motors(robot: reojax.Robot, line: Line) -> Motor:
-    """Motors of 1 V with such lines behind the robot's own gears, with its own rotors."""
-    ratio = np.where(np.asarray(robot.gear_ratio) == 0, 1.0, np.asarray(robot.gear_ratio))
-    constant = 1 / (ratio * np.broadcast_to(line.free, ratio.shape))
-    stall = np.broadcast_to(line.stall, ratio.shape) / ratio
-    return Motor(
-        supply=np.ones_like(ratio),
-        resistance=constant / stall,
-        torque_constant=constant,
-        rotor_inertia=np.asarray(robot.rotor_inertia),
-        gear_ratio=ratio,
-    )

@@ -8,13 +8,13 @@ import jax
 import numpy as np
 import pure_pitch
 from common.markdown import table
+from common.proof import prove
 from common.tables import least_travel
 from design_opt import best_loops
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 import reojax
-from atlas_parts.proof import prove
 from atlas_parts.store import Row, Store
 from atlas_parts.subjects import Subject
 from reojax import RE_MAX_17, design, plot, robots, so3

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 from common.markdown import table
+from common.proof import prove
 
 import reojax
 from atlas_parts.clear_turns import Effort, Turns, boxed_turns, clear_turns, free_turns
-from atlas_parts.proof import prove
 from atlas_parts.store import Row, Store
 from atlas_parts.subjects import USUAL_AXES, Subject, subject
 from reojax import so3

@@ -4,8 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from atlas_parts import bounds, motors, proof
+from atlas_parts import bounds, motors
 from atlas_parts.store import Store
+from common import proof
 
 import reojax
 from reojax import so3

@@ -4,10 +4,10 @@ import importlib.util
 from typing import Any
 
 import numpy as np
-from common.replay import pinocchio
 from scipy.spatial.transform import Rotation
 
 import reojax
+from common.replay import pinocchio
 
 MOMENTUM, MISS, LIMIT = 1e-8, 1e-7, 1e-9
 """Largest momentum (a share), angle to the target [rad], and angle beyond a limit [rad] of a row that counts."""
