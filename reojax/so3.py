@@ -14,18 +14,15 @@ fewer digits on an accelerator.
 
 from __future__ import annotations
 
-import math
-
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import lax
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from reojax._internal import rotations
 from reojax._internal.arrays import Array, is_concrete, refuse_lookalikes
 from reojax._internal.checks import key as check_key, shorten
-from reojax._internal.quaternions import outer_rows
 
 
 def hat(vector: ArrayLike) -> Float[Array, "3 3"]:
@@ -37,9 +34,7 @@ def hat(vector: ArrayLike) -> Float[Array, "3 3"]:
     Raises:
         ValueError: if `vector` is not of shape (3,).
     """
-    x, y, z = _floats(vector, "vector", (3,))
-    zero = jnp.zeros_like(x)
-    return jnp.stack([zero, -z, y, z, zero, -x, -y, x, zero]).reshape(3, 3)
+    return rotations.cross_matrix(_floats(vector, "vector", (3,)))
 
 
 def vee(matrix: ArrayLike) -> Float[Array, "3"]:
@@ -66,7 +61,7 @@ def exp(vector: ArrayLike) -> Float[Array, "3 3"]:
     """
     half = 0.5 * _floats(vector, "vector", (3,))
     square = jnp.sum(half * half)
-    return _quaternion_matrix(_stumpff(0, square), _stumpff(1, square) * half)
+    return rotations.matrix_of_quaternion(rotations.stumpff(0, square), rotations.stumpff(1, square) * half)
 
 
 def log(rotation: ArrayLike) -> Float[Array, "3"]:
@@ -81,7 +76,7 @@ def log(rotation: ArrayLike) -> Float[Array, "3"]:
     Raises:
         ValueError: if `rotation` is not of shape (3, 3).
     """
-    q = _unit_quaternion(_floats(rotation, "rotation", (3, 3)))
+    q = rotations.unit_quaternion(_floats(rotation, "rotation", (3, 3)))
     w, u = q[0], q[1:]
     square = jnp.sum(u * u)
     near = 64 * square < w * w  # tan(angle / 2) < 1/8, where 12 terms of the arctangent reach rounding
@@ -106,8 +101,8 @@ def angle(rotation: ArrayLike) -> Float[Array, ""]:
     Raises:
         ValueError: if `rotation` is not of shape (3, 3).
     """
-    q = _unit_quaternion(_floats(rotation, "rotation", (3, 3)))
-    return 2 * jnp.arctan2(_length(q[1:]), q[0])
+    q = rotations.unit_quaternion(_floats(rotation, "rotation", (3, 3)))
+    return 2 * jnp.arctan2(rotations.length(q[1:]), q[0])
 
 
 def left_jacobian(vector: ArrayLike) -> Float[Array, "3 3"]:
@@ -124,7 +119,11 @@ def left_jacobian(vector: ArrayLike) -> Float[Array, "3 3"]:
     """
     v = _floats(vector, "vector", (3,))
     square = jnp.sum(v * v)
-    return jnp.eye(3, dtype=v.dtype) + _stumpff(2, square) * hat(v) + _stumpff(3, square) * _hat_squared(v)
+    return (
+        jnp.eye(3, dtype=v.dtype)
+        + rotations.stumpff(2, square) * rotations.cross_matrix(v)
+        + rotations.stumpff(3, square) * rotations.cross_matrix_squared(v)
+    )
 
 
 def to_quaternion(rotation: ArrayLike) -> Float[Array, "4"]:
@@ -138,7 +137,7 @@ def to_quaternion(rotation: ArrayLike) -> Float[Array, "4"]:
     Raises:
         ValueError: if `rotation` is not of shape (3, 3).
     """
-    return _unit_quaternion(_floats(rotation, "rotation", (3, 3)))
+    return rotations.unit_quaternion(_floats(rotation, "rotation", (3, 3)))
 
 
 def from_quaternion(quaternion: ArrayLike) -> Float[Array, "3 3"]:
@@ -150,8 +149,8 @@ def from_quaternion(quaternion: ArrayLike) -> Float[Array, "3 3"]:
     Raises:
         ValueError: if `quaternion` is not of shape (4,).
     """
-    q, _ = _scale(_floats(quaternion, "quaternion", (4,)))
-    return _quaternion_matrix(q[0], q[1:], jnp.sum(q * q))
+    q, _ = rotations.scale_to_one(_floats(quaternion, "quaternion", (4,)))
+    return rotations.matrix_of_quaternion(q[0], q[1:], jnp.sum(q * q))
 
 
 def to_euler_zxz(rotation: ArrayLike) -> Float[Array, "3"]:
@@ -166,13 +165,13 @@ def to_euler_zxz(rotation: ArrayLike) -> Float[Array, "3"]:
     Raises:
         ValueError: if `rotation` is not of shape (3, 3).
     """
-    w, x, y, z = _unit_quaternion(_floats(rotation, "rotation", (3, 3)))
+    w, x, y, z = rotations.unit_quaternion(_floats(rotation, "rotation", (3, 3)))
     # (w, z) = cos(b/2) (cos, sin)((a + c)/2)  and  (x, y) = sin(b/2) (cos, sin)((a - c)/2)
-    cosine, half_sum = _polar(w, z)
-    sine, half_difference = _polar(x, y)
+    cosine, half_sum = rotations.polar(w, z)
+    sine, half_difference = rotations.polar(x, y)
     half_difference = jnp.where(sine == 0, half_sum, half_difference)
     half_sum = jnp.where(cosine == 0, half_difference, half_sum)
-    a, c = _wrap(half_sum + half_difference), _wrap(half_sum - half_difference)
+    a, c = rotations.wrap(half_sum + half_difference), rotations.wrap(half_sum - half_difference)
     return jnp.stack([a, 2 * jnp.arctan2(sine, cosine), c])
 
 
@@ -241,69 +240,3 @@ def _floats(value: ArrayLike | float | int, name: str, shape: tuple[int, ...]) -
     if is_concrete(array) and np.isnan(np.asarray(array)).any():
         raise ValueError(f"`{name}` has an entry that is not a number: {shorten(np.asarray(array).tolist())}.")
     return array if jnp.issubdtype(array.dtype, jnp.floating) else array.astype(float)
-
-
-def _stumpff(order: int, square: jax.Array) -> jax.Array:
-    """Sum of `(-square)^i / (2 i + order)!`: cos t, sin t / t, (1 - cos t) / t^2, (t - sin t) / t^3.
-
-    Here `square` is t^2. Below t = 1 eleven terms reach rounding, two derivatives included, in any dtype.
-    """
-    near = square < 1
-    inside = jnp.where(near, square, 0.0)
-    series = jnp.zeros_like(inside)
-    for i in reversed(range(11)):
-        series = 1 / math.factorial(2 * i + order) - inside * series
-    t = jnp.sqrt(jnp.where(near, 1.0, square))
-    closed = (
-        lambda: jnp.cos(t),
-        lambda: jnp.sin(t) / t,
-        lambda: (1 - jnp.cos(t)) / (t * t),
-        lambda: (t - jnp.sin(t)) / (t * t * t),
-    )[order]
-    return jnp.where(near, series, closed())
-
-
-def _hat_squared(u: jax.Array) -> jax.Array:
-    return u[:, None] * u[None, :] - jnp.sum(u * u) * jnp.eye(3, dtype=u.dtype)
-
-
-def _quaternion_matrix(w: jax.Array, u: jax.Array, square: jax.Array | float = 1.0) -> jax.Array:
-    """Rotation of the quaternion (w, u) whose squared length is `square`."""
-    return jnp.eye(3, dtype=u.dtype) + (2 / square) * (w * hat(u) + _hat_squared(u))
-
-
-def _unit_quaternion(r: jax.Array) -> jax.Array:
-    """Of the rows of `4 q q^T`, linear in the matrix, normalise that of the largest component (Shepperd)."""
-    rows = outer_rows(r)
-    largest = lax.argmax(jnp.stack([rows[i][i] for i in range(4)]), 0, np.int32)
-    row = lax.select_n(largest, *(jnp.stack(row) for row in rows))
-    q = row / jnp.sqrt(jnp.sum(row * row))
-    return jnp.where(q[0] < 0, -q, q)
-
-
-def _scale(vector: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Return `vector / scale` and `scale`: its largest component, or 1 at zero; a constant to autodiff."""
-    scale = lax.stop_gradient(jnp.max(jnp.abs(vector)))
-    scale = jnp.where(scale > jnp.finfo(vector.dtype).tiny, scale, 1.0)
-    return vector / scale, scale
-
-
-def _length(vector: jax.Array) -> jax.Array:
-    """Length of a vector, with derivative 0 at zero."""
-    unit, scale = _scale(vector)
-    square = jnp.sum(unit * unit)
-    zero = square == 0
-    return jnp.where(zero, 0.0, scale * jnp.sqrt(jnp.where(zero, 1.0, square)))
-
-
-def _polar(x: jax.Array, y: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Length and direction of (x, y); the direction of (0, 0) is 0, and both have derivative 0 there."""
-    length = _length(jnp.stack([x, y]))
-    x, y = _scale(jnp.stack([x, y]))[0]
-    return length, jnp.arctan2(jnp.where(length == 0, 0.0, y), jnp.where(length == 0, 1.0, x))
-
-
-def _wrap(turn: jax.Array) -> jax.Array:
-    """Angle in (-3 pi, 3 pi) brought to (-pi, pi]."""
-    turn = jnp.where(turn > math.pi, turn - 2 * math.pi, turn)
-    return jnp.where(turn <= -math.pi, turn + 2 * math.pi, turn)
