@@ -15,7 +15,7 @@ vector of each step.
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -25,11 +25,10 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
-from reojax._internal.linalg import solve_positive, solve_without_exchange
-from reojax.mechanics.dynamics import joint_inertia_of_pose, joint_load, rotor_inertia_of_pose
+from reojax.mechanics.dynamics import joint_load
 from reojax.mechanics.integrators import RK4, runge_kutta_step
-from reojax.mechanics.kinematics import kinematics
 from reojax.mechanics.own_units import without_names
+from reojax.motion.driven_joints import joint_acceleration, saturate
 from reojax.motion.motor import Motor, check_motors, drive, per_joint
 from reojax.motion.pid import Gains, check_gains
 from reojax.motion.trajectory import Trajectory
@@ -39,8 +38,8 @@ from reojax.robot import Robot
 COUNTS = 512.0
 """Counts of an encoder to a turn of its motor, before the gear (thesis 2.6)."""
 _MOST_SAMPLES = 10**7
-_CREEP = 1.0
-"""Speed of a rotor over which friction changes its sign smoothly [rad/s]."""
+_State = tuple[Array, tuple[Array, Array]]
+"""Orientation of the base; joint angles and rates."""
 
 
 class Tracking(NamedTuple):
@@ -216,10 +215,7 @@ def _track(
     period = jnp.asarray(sample_time, dtype)
     time = period * jnp.arange(samples + 1, dtype=dtype)
     plan = jax.vmap(trajectory.at)(time)
-    ahead = jax.vmap(trajectory.at)(time + period / 2)  # the command is held for a period
-    forward = jax.vmap(lambda state: drive(model, motors, state.theta_dot, joint_load(model, *state)).torque)(ahead)
-    moving = time + period / 2 < trajectory.duration
-    forward = jnp.where(moving[:, None] & feedforward, forward, 0.0)
+    forward = jnp.where(feedforward, _precompute(model, motors, trajectory, time, period), 0.0)
     ratio = robot.gear_ratio
     size = jnp.asarray(turn, dtype) / jnp.abs(ratio)
 
@@ -235,19 +231,11 @@ def _track(
         pid = gains.proportional * error + gains.integral * summed + gains.derivative * rate
         command = pid / ratio + given
         # what the motors can give of it
-        torque = _saturate(motors, command, ratio * theta_dot)
+        torque = saturate(motors, command, ratio * theta_dot)
         saturated = torque != command
         kept = jnp.where(saturated, integral, summed)  # no wind-up
 
-        # the joints and the base until the next sample, the command held
-        def rates(rotation: Array, joints: tuple[Array, Array], _: None) -> tuple[Array, tuple[Array, Array]]:
-            acceleration, omega = _acceleration(robot, motors, command, *joints, rotation.T @ momentum)
-            return omega, (joints[1], acceleration)
-
-        def between(state: tuple[Array, Any], _: None) -> tuple[tuple[Array, Any], None]:
-            return runge_kutta_step(RK4, rates, period / substeps, *state), None
-
-        (turned, joints), _ = jax.lax.scan(between, (rotation, (theta, theta_dot)), length=substeps)
+        turned, joints = _hold(robot, motors, command, momentum, (rotation, (theta, theta_dot)), period, substeps)
         return (*joints, turned, kept, seen), (theta, theta_dot, rotation, command, torque, saturated)
 
     start = plan.theta[0], plan.theta_dot[0], jnp.eye(3, dtype=dtype)
@@ -259,46 +247,30 @@ def _track(
     return Tracking(time, plan.theta, theta, theta_dot, rotation, command, torque, saturated)
 
 
+def _precompute(model: Robot, motors: Motor, trajectory: Trajectory, time: Array, period: Array) -> Array:
+    """Torques of the motors (m, j) that the planned motion takes by the model, each for the period from a sample on."""
+    middle = time + period / 2  # the command is held for a period
+    states = jax.vmap(trajectory.at)(middle)
+    torque = jax.vmap(lambda state: drive(model, motors, state.theta_dot, joint_load(model, *state)).torque)(states)
+    return jnp.where((middle < trajectory.duration)[:, None], torque, 0.0)
+
+
+def _hold(
+    robot: Robot, motors: Motor, command: Array, momentum: Array, state: _State, period: Array, substeps: int
+) -> _State:
+    """The base's orientation and the joints one period later, the command held."""
+
+    def rates(rotation: Array, joints: tuple[Array, Array], _: None) -> tuple[Array, tuple[Array, Array]]:
+        acceleration, omega = joint_acceleration(robot, motors, command, *joints, rotation.T @ momentum)
+        return omega, (joints[1], acceleration)
+
+    def substep(state: _State, _: None) -> tuple[_State, None]:
+        return runge_kutta_step(RK4, rates, period / substeps, *state), None
+
+    return jax.lax.scan(substep, state, length=substeps)[0]
+
+
 def _count(theta: Array, size: Array) -> Array:
     """What encoders tell of joint angles, in counts of that `size`, all if 0; its derivative is that of the angles."""
     count = jnp.where(size > 0, size, 1)
     return theta + jax.lax.stop_gradient(jnp.where(size > 0, count * jnp.round(theta / count) - theta, 0))
-
-
-def _saturate(motors: Motor, command: Array, speed: Array) -> Array:
-    """Torque that the motors can give of what is asked for."""
-    k = motors.torque_constant
-    least, most = (jnp.asarray((sign * motors.supply - k * speed) * k / motors.resistance) for sign in (-1, 1))
-    return jnp.clip(command, least, most)
-
-
-def _acceleration(
-    robot: Robot, motors: Motor, command: Array, theta: Array, rate: Array, momentum: Array
-) -> tuple[Array, Array]:
-    """Joint accelerations and the base's angular velocity under motor torques, gears' losses included.
-
-    With `P` the motor's torque at the joint after friction and `S(theta_ddot)` what spins up its rotor (`Load.rotor`),
-    the joint gets `k (P - S) + S`, k the efficiency, or one over it while the joint drives the motor: what `drive` asks
-    of the motor for this acceleration is what it gives. Whether a joint drives is decided without losses first, and
-    again with those.
-    """
-    ratio = robot.gear_ratio
-    # power P at the joint: torque within the supply, less drag and friction
-    speed = ratio * rate
-    friction = motors.drag * speed + motors.friction * jnp.tanh(speed / _CREEP)
-    power = ratio * (_saturate(motors, command, speed) - friction)
-    # torque that the joints need without accelerating
-    still = joint_load(robot, theta, rate, jnp.zeros_like(theta), momentum=momentum)
-    pose = kinematics(robot, theta)
-    inertia, rotor = joint_inertia_of_pose(robot, pose), rotor_inertia_of_pose(robot, pose)
-
-    def accelerated(before: Array) -> Array:
-        # which way the gear's loss goes, by the acceleration before
-        driving = (power - still.rotor - rotor @ before) * rate >= 0
-        k = jnp.where(driving, motors.efficiency, 1 / jnp.asarray(motors.efficiency_back))
-        # k (P - S) + S = D theta_ddot + torque at rest
-        lossy = inertia - (1 - k)[:, None] * rotor
-        return solve_without_exchange(lossy, k * power - still.torque + (1 - k) * still.rotor)
-
-    ideal = solve_positive(inertia, power - still.torque)
-    return accelerated(accelerated(ideal)), still.omega

@@ -9,7 +9,8 @@ import reojax
 from reojax import Gains, robots, so3
 from reojax.captures import comparison
 from reojax.mechanics.dynamics import joint_load
-from reojax.motion.closed_loop import _acceleration, track
+from reojax.motion.closed_loop import track
+from reojax.motion.driven_joints import joint_acceleration
 from reojax.motion.motor import check_motors, drive, per_joint
 from reojax.motion.pid import gains
 
@@ -68,7 +69,7 @@ def test_the_motors_are_those_of_the_inverse_problem(efficiency):
     theta, momentum = jnp.array([0.3, 0.8, -0.4]), jnp.array([1e-5, 0.0, -2e-5])
     for rate in (jnp.array([20.0, -15.0, 10.0]), jnp.array([-20.0, 15.0, 10.0])):
         command = jnp.array([4e-3, -3e-3, 5e-3])
-        acceleration, omega = _acceleration(ROBOT, motors, command, theta, rate, momentum)
+        acceleration, omega = joint_acceleration(ROBOT, motors, command, theta, rate, momentum)
         load = joint_load(ROBOT, theta, rate, acceleration, momentum=momentum)
         np.testing.assert_allclose(drive(ROBOT, motors, rate, load).torque, command, rtol=1e-10)
         np.testing.assert_allclose(load.omega, omega, rtol=1e-12)
