@@ -5,9 +5,7 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -16,9 +14,9 @@ import numpy as np
 from reojax._internal.checks import shorten
 from reojax._internal.definiteness import turn_about
 from reojax.models.description import Description, JointEntry, Kind, LinkEntry, Shape, rotation_of_quaternion
-from reojax.models.mjcf_names import without_repeated_names
+from reojax.models.mjcf_compile import compile_mjcf
+from reojax.models.mjcf_constraints import constraints_of
 
-_TWICE = re.compile(r"repeated name .* in (texture|material|geom|light|camera)")
 _CAREFUL = ("balanceinertia", "settotalmass")
 """Settings of a file that change its inertias: told."""
 
@@ -31,7 +29,7 @@ def read_mjcf(path: str | os.PathLike[str], root: ElementTree.Element, base: str
         ImportError: saying what to install.
     """
     notes: list[str] = []
-    model = _compile(path, notes)
+    model = compile_mjcf(path, notes)
     for setting in root.iter("compiler"):
         notes += [f"the file sets {key}={setting.get(key)!r}" for key in _CAREFUL if setting.get(key) is not None]
     bodies = _names(model, "body", model.nbody)
@@ -44,70 +42,10 @@ def read_mjcf(path: str | os.PathLike[str], root: ElementTree.Element, base: str
         links[bodies[i]] = _link(model, i)
         if i != tree[0]:
             _hang(model, i, bodies, joints, gears, links, entries, notes)
-    constraints = tuple(_constraints(model, bodies, joints, notes))
+    constraints = tuple(constraints_of(model, bodies, joints, notes))
     if model.ntendon:
         notes.append(f"left out: {model.ntendon} tendons; a robot here has joint motors only")
     return Description(root.get("model") or "robot", links, entries, bodies[tree[0]], constraints, tuple(notes))
-
-
-def _compile(path: str | os.PathLike[str], notes: list[str]) -> Any:
-    try:
-        import mujoco
-    except ImportError as error:
-        raise ImportError('reading MJCF needs MuJoCo: pip install "reojax[models]"') from error
-    try:
-        spec = _spec(mujoco, path, notes)
-        spec.compiler.fusestatic = False
-        try:
-            return spec.compile()
-        except (ValueError, RuntimeError):
-            _strip(spec, Path(path).resolve().parent, notes)  # pictures that are missing do not matter
-            return spec.compile()
-    except (ValueError, RuntimeError, FileNotFoundError) as error:
-        raise ValueError(f"MuJoCo does not take it: {' '.join(str(error).split())[:400]}") from None
-
-
-def _spec(mujoco: Any, path: str | os.PathLike[str], notes: list[str]) -> Any:
-    """The file as MuJoCo reads it, where names of pictures and shapes come twice without them."""
-    try:
-        return mujoco.MjSpec.from_file(os.fspath(path))
-    except ValueError as error:
-        if not _TWICE.search(str(error)):
-            raise
-    text, parts = without_repeated_names(Path(path))
-    notes.append("textures, materials and names of shapes left out: the file and those it includes give some twice")
-    return mujoco.MjSpec.from_string(text, include=parts)
-
-
-def _strip(spec: Any, folder: Path, notes: list[str]) -> None:
-    """Take out what only pictures need, and meshes whose files are missing."""
-    for geom in spec.geoms:
-        geom.material = ""
-    for group in (spec.materials, spec.textures, spec.skins):
-        for item in list(group):
-            spec.delete(item)
-    lost = set()
-    for mesh in spec.meshes:
-        if not mesh.file or (folder / (spec.meshdir or "") / mesh.file).is_file():
-            continue
-        found = [path for path in folder.glob(f"*/{Path(mesh.file).name}") if path.is_file()]
-        if len(found) == 1:
-            mesh.file = str(found[0])
-            notes.append(f"mesh {mesh.name!r} found in the folder {found[0].parent.name!r}")
-        else:
-            lost.add(mesh.name)
-    for geom in list(spec.geoms):
-        if geom.meshname in lost:
-            body = geom.parent
-            if not body.explicitinertial and geom.mass != 0 and body is not spec.worldbody:
-                raise ValueError(
-                    f"link {body.name!r} has its inertia from mesh {geom.meshname!r}, whose file is missing"
-                )
-            notes.append(f"shape left out: mesh {geom.meshname!r} of link {body.name!r}, whose file is missing")
-            spec.delete(geom)
-    for mesh in list(spec.meshes):
-        if mesh.name in lost:
-            spec.delete(mesh)
 
 
 def _names(model: Any, what: str, count: int) -> list[str]:
@@ -283,43 +221,3 @@ def _gears(model: Any, joints: list[str], notes: list[str]) -> dict[int, float]:
         elif 0.0 not in values:
             gears[j] = values.pop()
     return gears
-
-
-def _constraints(
-    model: Any, bodies: list[str], joints: list[str], notes: list[str]
-) -> Iterator[tuple[str, str, tuple[str, ...], tuple[str, ...]]]:
-    import mujoco
-
-    for e in range(model.neq):
-        kind = mujoco.mjtEq(int(model.eq_type[e]))
-        word = kind.name.removeprefix("mjEQ_").lower()
-        name = model.equality(e).name or f"equality{e}"
-        if not model.eq_active0[e]:
-            notes.append(f"left out: equality constraint {shorten(name)} ({word}), which is not active")
-            continue
-        ids = [int(model.eq_obj1id[e]), int(model.eq_obj2id[e])]
-        if kind in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
-            if int(model.eq_objtype[e]) == int(mujoco.mjtObj.mjOBJ_SITE):
-                ids = [int(model.site_bodyid[i]) for i in ids]
-            yield name, word, tuple(bodies[i] for i in ids), ()
-        elif kind == mujoco.mjtEq.mjEQ_JOINT:
-            yield name, word, (), tuple(joints[i] for i in ids if i >= 0)
-        elif kind == mujoco.mjtEq.mjEQ_TENDON:
-            yield name, word, *_wrapped(model, [i for i in ids if i >= 0], bodies, joints)
-        else:  # soft bodies: nothing that locking joints can meet
-            yield name, word, (), tuple(joints)
-
-
-def _wrapped(model: Any, tendons: list[int], bodies: list[str], joints: list[str]) -> tuple[tuple, tuple]:
-    """Links and joints that tendons run over."""
-    import mujoco
-
-    links, tied = [], []
-    for tendon in tendons:
-        for w in range(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon]):
-            kind, i = int(model.wrap_type[w]), int(model.wrap_objid[w])
-            if kind == int(mujoco.mjtWrap.mjWRAP_JOINT):
-                tied.append(joints[i])
-            elif kind == int(mujoco.mjtWrap.mjWRAP_SITE):
-                links.append(bodies[int(model.site_bodyid[i])])
-    return tuple(links), tuple(tied)
