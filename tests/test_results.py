@@ -6,7 +6,7 @@ import pytest
 
 import reojax
 from reojax import RE_MAX_17
-from reojax.design.problem import Solutions
+from reojax.design.solutions import Solutions
 from reojax.optimisation.optimise import Solution
 from reojax.optimisation.status import Status
 

@@ -12,7 +12,7 @@ import reojax
 from common.types import Array
 from reojax import design, interop, so3
 from reojax.design import Loops, Problem, Solution, Variable
-from reojax.design.problem import Measure
+from reojax.design.outcome import Measure
 
 TARGET = Variable("target", [-7.0] * 3, [7.0] * 3, "rad")
 """Rotation vector to reach; held, so that one program serves all targets."""

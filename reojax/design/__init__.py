@@ -19,8 +19,10 @@ from reojax.design.measures import (
     value_of as value_of,
     weighted as weighted,
 )
-from reojax.design.problem import Outcome as Outcome, Problem as Problem, Solutions as Solutions
+from reojax.design.outcome import Outcome as Outcome
+from reojax.design.problem import Problem as Problem
 from reojax.design.smooth import fourier_loops as fourier_loops, spline_loops as spline_loops
+from reojax.design.solutions import Solutions as Solutions
 from reojax.design.uncertainty import (
     Sensitivities as Sensitivities,
     Spread as Spread,

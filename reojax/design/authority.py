@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
-from reojax.design.problem import Measure, Outcome
+from reojax.design.outcome import Measure, Outcome
 from reojax.mechanics.holonomy import rotation_history
 from reojax.mechanics.variation import turn_per_change
 from reojax.path import Path

@@ -11,7 +11,7 @@ from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax._internal.checks import numbers
 from reojax.design.loops import Loops
-from reojax.design.problem import Measure, Outcome
+from reojax.design.outcome import Measure, Outcome
 from reojax.design.self_clearance import ClearBy
 from reojax.path import joint_travel
 

@@ -4,89 +4,31 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers
-from reojax.collision.path_clearance import PathClearance, path_clearance
 from reojax.design.loops import Loops
+from reojax.design.outcome import Measure, Outcome
 from reojax.design.self_clearance import TIGHTENED, ClearBy, prove
-from reojax.design.variables import Space, Variable
-from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation
+from reojax.design.solutions import Solutions
+from reojax.design.variables import Space, Variable, neighbours
+from reojax.mechanics.holonomy import DEFAULT_STEPS
 from reojax.optimisation.functions import Functions
-from reojax.optimisation.optimise import Solution, optimise
-from reojax.optimisation.status import describe
+from reojax.optimisation.optimise import Solution, choose_best, optimise
 from reojax.path import Path
 from reojax.robot import Robot
 
 Build = Callable[[dict[str, Array]], tuple[Robot, Path]]
 
 
-class Outcome:
-    """What a design does; its quantities are computed when they are asked for."""
-
-    def __init__(self, values: dict[str, Array], robot: Robot, path: Path, steps: int) -> None:
-        """Keep the parts; `Problem.outcome` calls this."""
-        self.values, self.robot, self.path, self.steps = values, robot, path, steps
-
-    @cached_property
-    def rotation(self) -> Float[Array, "3 3"]:
-        """Net rotation of the base after the loop."""
-        return net_rotation(self.robot, self.path, steps=self.steps)
-
-    @cached_property
-    def clearance(self) -> PathClearance:
-        """Least clearance along the whole loop, proven."""
-        return path_clearance(self.robot, self.path)
-
-
-Measure = Callable[[Outcome], Any]
-"""A quantity of a design: a scalar, or a vector (k,), traced by JAX. Any function of an `Outcome` will do: it reads
-`.values` (by name, SI), `.robot`, `.path`, `.rotation` and `.clearance`."""
 Vector = Callable[[Array], Array]
-
-
-class Solutions(NamedTuple):
-    """Answers of k problems from s starts each; fields as those of `Solution`."""
-
-    value: Float[np.ndarray, "k s n"]
-    cost: Float[np.ndarray, "k s"]
-    residual: Float[np.ndarray, "k s"]
-    slope: Float[np.ndarray, "k s"]
-    steps: Int[np.ndarray, "k s"]
-    converged: Bool[np.ndarray, "k s"]
-    status: Int[np.ndarray, "k s"]
-    best: Int[np.ndarray, " k"]
-    """Which start is best for each problem: of least cost among the converged, else of least residual."""
-
-    @property
-    def violation(self) -> Float[np.ndarray, "k s"]:
-        """Another name for `residual`, the one that all solvers' results have."""
-        return self.residual
-
-    @property
-    def error(self) -> Float[np.ndarray, "k s"]:
-        """Another name for `residual`."""
-        return self.residual
-
-    @property
-    def message(self) -> list[list[str]]:
-        """Why each start of each problem ended, in words."""
-        return [list(describe(row)) for row in self.status]
-
-    def pick(self) -> Solution:
-        """The best answer of each problem, the problems in front."""
-        rows = np.arange(len(self.best)), self.best
-        fields = {name: value[rows] for name, value in self._asdict().items() if name != "best"}
-        cost = np.where(fields["converged"], fields["cost"], np.inf)
-        return Solution(**fields, best=int(np.argmin(cost if fields["converged"].any() else fields["residual"])))
 
 
 class _Limits(NamedTuple):
@@ -237,7 +179,7 @@ class Problem:
         if not catalogues:
             return answer
         best = self.space.named(answer.value[answer.best])
-        choices = list(itertools.product(*(_neighbours(e, float(best[name])) for name, e in catalogues.items())))
+        choices = list(itertools.product(*(neighbours(e, float(best[name])) for name, e in catalogues.items())))
         # every combination of entries from every start, side by side
         each = {name: np.repeat([choice[i] for choice in choices], len(x)) for i, name in enumerate(catalogues)}
         each |= {name: np.asarray(value)[None] for name, value in held.items()}
@@ -291,8 +233,7 @@ class Problem:
             for name, value in found._asdict().items()
             if name != "best"
         }
-        cost = np.where(fields["converged"], fields["cost"], np.inf)
-        best = np.where(fields["converged"].any(1), cost.argmin(1), fields["residual"].argmin(1))
+        best = choose_best(*(fields[name] for name in ("cost", "residual", "converged")))
         return Solutions(**fields, best=best)
 
     def _starts(self, starts: int | ArrayLike, seed: int) -> Float[np.ndarray, "m n"]:
@@ -306,17 +247,7 @@ class Problem:
 
     def _solve_held(self, x: np.ndarray, held: Mapping[str, np.ndarray], limits: _Limits) -> Solution:
         """Solve with variables held at values (1 or m, ...), free where they are NaN."""
-        lower, upper = np.tile(self.space.lower, (len(x), 1)), np.tile(self.space.upper, (len(x), 1))
-        x = x.copy()
-        for name, value in held.items():
-            place = self.space.place(name)
-            part = np.broadcast_to(value.reshape(len(value), -1), x[:, place].shape)
-            fixed = ~np.isnan(part)
-            if (fixed & ~((lower[:, place] <= part) & (part <= upper[:, place]))).any():
-                values = checks.shorten(np.squeeze(value).tolist())
-                raise ValueError(f"{name!r} is held at {values}, which is outside of its bounds (SI).")
-            for array in (x, lower, upper):
-                array[:, place] = np.where(fixed, part, array[:, place])
+        x, lower, upper = self.space.hold(x, held)
         size = np.where(self.space.upper > self.space.lower, self.space.upper - self.space.lower, 1.0)
 
         def run(x: np.ndarray, rows: np.ndarray, level: int) -> Solution:
@@ -341,12 +272,3 @@ class Problem:
 
 def _concatenate(x: Array, parts: Sequence[Any]) -> Array:
     return jnp.concatenate([jnp.zeros(0, x.dtype), *(jnp.reshape(part, -1) for part in parts)])
-
-
-def _neighbours(entries: np.ndarray, value: float) -> list[float]:
-    """Catalogue entries on either side of a value, or the one that it is, or the end that it is beyond."""
-    near = np.isclose(entries, value, rtol=1e-9, atol=0)
-    if near.any():
-        return [float(entries[near][0])]
-    above = int(np.searchsorted(entries, value))
-    return [float(entry) for entry in entries[max(above - 1, 0) : above + 1]]

@@ -11,7 +11,7 @@ import numpy as np
 
 from reojax.collision.clearance import without_pairs
 from reojax.collision.constraint import clearance_shortfall
-from reojax.optimisation.optimise import Solution
+from reojax.optimisation.optimise import Solution, choose_best
 from reojax.optimisation.status import Status
 
 _BETWEEN = 2.0
@@ -77,6 +77,5 @@ def prove(
             value[short] = getattr(again, name)
         fields["steps"][short] += before
         short = short[fields["converged"][short]]
-    reached = fields["converged"]
-    best = np.where(reached, fields["cost"], np.inf).argmin() if reached.any() else fields["residual"].argmin()
+    best = choose_best(*(fields[name] for name in ("cost", "residual", "converged")))
     return Solution(**fields, best=int(best))

@@ -99,6 +99,31 @@ class Space:
             x[self.place(variable.name)] = array.ravel() * SI[variable.unit]
         return x
 
+    def hold(
+        self, x: Float[np.ndarray, "m n"], held: Mapping[str, np.ndarray]
+    ) -> tuple[Float[np.ndarray, "m n"], Float[np.ndarray, "m n"], Float[np.ndarray, "m n"]]:
+        """Designs and their lower and upper bounds, with variables kept at values (1 or m, ...) in SI.
+
+        Args:
+            x: designs in SI.
+            held: values by name, NaN where the variable is free.
+
+        Raises:
+            ValueError: for an unknown name, or a value outside of its bounds.
+        """
+        lower, upper = np.tile(self.lower, (len(x), 1)), np.tile(self.upper, (len(x), 1))
+        x = x.copy()
+        for name, value in held.items():
+            place = self.place(name)
+            part = np.broadcast_to(value.reshape(len(value), -1), x[:, place].shape)
+            fixed = ~np.isnan(part)
+            if (fixed & ~((lower[:, place] <= part) & (part <= upper[:, place]))).any():
+                values = shorten(np.squeeze(value).tolist())
+                raise ValueError(f"{name!r} is held at {values}, which is outside of its bounds (SI).")
+            for array in (x, lower, upper):
+                array[:, place] = np.where(fixed, part, array[:, place])
+        return x, lower, upper
+
     def catalogues(self) -> dict[str, Float[np.ndarray, " k"]]:
         """The catalogues in SI, by name, of the variables that have one."""
         return {
@@ -120,3 +145,12 @@ def _bounds(variable: Variable) -> tuple[np.ndarray, np.ndarray]:
         if low.shape or not ((low <= entries) & (entries <= high)).all():
             raise ValueError(f"variable {name!r} has the catalogue {entries}; it must lie within its bounds, numbers.")
     return low * SI[variable.unit], high * SI[variable.unit]
+
+
+def neighbours(entries: np.ndarray, value: float) -> list[float]:
+    """Catalogue entries on either side of a value, or the one that it is, or the end that it is beyond."""
+    near = np.isclose(entries, value, rtol=1e-9, atol=0)
+    if near.any():
+        return [float(entries[near][0])]
+    above = int(np.searchsorted(entries, value))
+    return [float(entry) for entry in entries[max(above - 1, 0) : above + 1]]

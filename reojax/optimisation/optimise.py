@@ -16,7 +16,8 @@ from reojax._internal.precision import warn_user
 from reojax._internal.progress import label
 from reojax.optimisation.arguments import check_starts, check_tolerances
 from reojax.optimisation.functions import Function, Functions, Programs
-from reojax.optimisation.sqp import Iterates, Problem, minimise
+from reojax.optimisation.iterates import Iterates, ScaledProblem
+from reojax.optimisation.sqp import minimise
 from reojax.optimisation.status import Status, describe
 
 _LEAST_SINGLE = 1e-6
@@ -150,7 +151,7 @@ def _run(
             'precision on by jax.config.update("jax_enable_x64", True) before anything is computed, or ask for 1e-5.'
         )
     programs = Programs(functions, x, data)
-    problem = Problem(
+    problem = ScaledProblem(
         programs=programs,
         lower=box.lower / box.scale,
         upper=box.upper / box.scale,
@@ -163,6 +164,14 @@ def _run(
     with tqdm(total=len(x), desc=label(progress), unit="start", file=sys.stderr, disable=not progress) as bar:
         ended = minimise(problem, x / box.scale, lambda count: bar.update(count - bar.n))
     return _solution(ended, box.lower, box.upper, box.scale, x.dtype)
+
+
+def choose_best(
+    cost: Float[np.ndarray, "*k m"], residual: Float[np.ndarray, "*k m"], converged: Bool[np.ndarray, "*k m"]
+) -> Int[np.ndarray, "*k"]:
+    """Of m answers the number of the one of least cost among the converged, else of least residual."""
+    least = np.where(converged, cost, np.inf).argmin(-1)
+    return np.where(converged.any(-1), least, residual.argmin(-1))
 
 
 def _several(
@@ -180,7 +189,6 @@ def _solution(ended: Iterates, lower: np.ndarray, upper: np.ndarray, scale: np.n
         np.where(begun, a, np.inf).astype(dtype) for a in (ended.cost, ended.violation, ended.slope)
     )
     converged = ended.status == Status.CONVERGED
-    best = np.argmin(np.where(converged, cost, np.inf)) if converged.any() else np.argmin(residual)
     return Solution(
         value=np.clip((ended.x * scale).astype(dtype), lower, upper),
         cost=cost,
@@ -188,6 +196,6 @@ def _solution(ended: Iterates, lower: np.ndarray, upper: np.ndarray, scale: np.n
         slope=slope,
         steps=ended.steps,
         converged=converged,
-        best=int(best),
+        best=int(choose_best(cost, residual, converged)),
         status=ended.status,
     )

@@ -18,25 +18,30 @@ Each round differentiates the trial points of all running starts in one go; star
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from reojax.optimisation.bfgs import update
-from reojax.optimisation.functions import Derivatives, Programs, Values
+from reojax.optimisation.functions import Derivatives, Values
+from reojax.optimisation.iterates import (
+    RUNNING,
+    Iterates,
+    ScaledProblem,
+    all_finite,
+    begin,
+    lagrangian_gradient,
+    stationarity_of,
+    within_tolerances,
+)
 from reojax.optimisation.line_search import SUFFICIENT, search
-from reojax.optimisation.merit import largest_violation, merit, predict, stationarity
+from reojax.optimisation.merit import largest_violation, merit, predict
 from reojax.optimisation.quadratic import Step, solve_quadratic
 from reojax.optimisation.status import Status
 
-RUNNING = -1
-"""Status of a start that goes on."""
 RESTARTS, ASIDE = 3, 0.3
 """How often a start may leave a local least of the violations, and by how much of the variables' ranges."""
-_LEAST_SCALE = 1e-2
-"""Rows that look flat at the start are not blown up by more than this."""
 _STILL, _PATIENCE = 1e-9, 12
 """Steps shorter than this, so many in a row, end a start."""
 _MOST_DAMPING = 1e9
@@ -47,99 +52,16 @@ _FLAT = 1e-9
 """Predicted reduction of half the squared violations, relative to them, that counts as none."""
 
 
-class Problem(NamedTuple):
-    """The functions, and what the variables of each start may be, in scaled variables."""
-
-    programs: Programs
-    lower: Float[np.ndarray, "m n"]
-    upper: Float[np.ndarray, "m n"]
-    scale: Float[np.ndarray, " n"]
-    precision: float
-    """Rounding of the functions, relative."""
-    tolerance: float
-    """For the constraints, in the user's own units."""
-    slope_tolerance: float
-    max_steps: int
-
-    def values(self, x: np.ndarray, owner: np.ndarray) -> Values:
-        """At scaled points."""
-        return self.programs.values(x * self.scale, owner)
-
-    def derivatives(self, x: np.ndarray, owner: np.ndarray) -> tuple[Values, Derivatives]:
-        """By the scaled variables; zero by those that are held, whatever the functions say."""
-        values, slopes = self.programs.derivatives(x * self.scale, owner)
-        free = (self.upper > self.lower)[owner]
-        gradient = np.where(free, slopes.gradient * self.scale, 0.0)
-        return values, Derivatives(gradient, np.where(free[:, None], slopes.jacobian * self.scale, 0.0))
-
-
-@dataclass
-class Iterates:
-    """All starts on their way, one a row. Scaled: `cost` by `cost_scale`, constraint rows by `row_scale`."""
-
-    x: Float[np.ndarray, "m n"]
-    """Where each is."""
-    f: Float[np.ndarray, " m"]
-    c: Float[np.ndarray, "m q"]
-    gradient: Float[np.ndarray, "m n"]
-    jacobian: Float[np.ndarray, "m q n"]
-    cost_scale: Float[np.ndarray, " m"]
-    row_scale: Float[np.ndarray, "m q"]
-    hessian: Float[np.ndarray, "m n n"]
-    """B."""
-    fresh: Bool[np.ndarray, " m"]
-    """Whether B has not yet been measured."""
-    damping: Float[np.ndarray, " m"]
-    """What B is a multiple of when it begins again after a failed step."""
-    multipliers: Float[np.ndarray, "m q"]
-    """Of the constraints, from the last program that could meet them."""
-    penalty: Float[np.ndarray, "m q"]
-    restoring: Bool[np.ndarray, " m"]
-    """Whether the last program could not, so that the step restores feasibility."""
-    step: Float[np.ndarray, "m n"]
-    reduction: Float[np.ndarray, " m"]
-    """Change of the merit that the program predicts, not positive."""
-    rounding: Float[np.ndarray, " m"]
-    """Of the merit."""
-    here: Float[np.ndarray, " m"]
-    """The merit at x."""
-    trial: Float[np.ndarray, "m n"]
-    """The point to differentiate next."""
-    chosen: Bool[np.ndarray, " m"]
-    """Whether the trial point is taken wherever the functions are finite."""
-    slope: Float[np.ndarray, " m"]
-    """Stationarity at x."""
-    steps: Int[np.ndarray, " m"]
-    stalled_steps: Int[np.ndarray, " m"]
-    arrived: Bool[np.ndarray, " m"]
-    """Whether both tolerances were met at x when it was reached."""
-    restarts: Int[np.ndarray, " m"]
-    nearest: list[tuple[float, np.ndarray, float, np.ndarray] | None]
-    """Least violation where a start was moved aside, with x, f and c there."""
-    status: Int[np.ndarray, " m"]
-    equalities: int
-
-    @property
-    def cost(self) -> Float[np.ndarray, " m"]:
-        """In the user's units."""
-        return self.f * self.cost_scale
-
-    @property
-    def violation(self) -> Float[np.ndarray, " m"]:
-        """Largest of each start, in the user's units."""
-        return largest_violation(self.c * self.row_scale, self.equalities)
-
-
-def minimise(problem: Problem, x: Float[np.ndarray, "m n"], report: Callable[[int], Any]) -> Iterates:
+def minimise(problem: ScaledProblem, x: Float[np.ndarray, "m n"], report: Callable[[int], Any]) -> Iterates:
     """Run all starts to their ends; `report` is told how many have got there."""
     ahead = problem.derivatives(x, np.arange(len(x)))
-    run = _begin(problem, x, *ahead)
+    run = begin(problem, x, *ahead)
     while (going := np.flatnonzero(run.status == RUNNING)).size:
         values, slopes = problem.derivatives(run.trial[going], going) if run.steps.any() else _rows_of(ahead, going)
         values = Values(values.cost / run.cost_scale[going], values.rows / run.row_scale[going])
         gradient = slopes.gradient / run.cost_scale[going, None]
         jacobian = slopes.jacobian / run.row_scale[going, :, None]
-        finite = _finite(values, gradient, jacobian)
+        finite = all_finite(values, gradient, jacobian)
         reached = merit(values.cost, values.rows, run.penalty[going], run.restoring[going], run.equalities)
         enough = run.here[going] + SUFFICIENT * run.reduction[going] + run.rounding[going]
         taken = finite & (run.chosen[going] | (reached <= enough))
@@ -161,53 +83,8 @@ def _rows_of(ahead: tuple[Values, Derivatives], who: np.ndarray) -> tuple[Values
     return Values(*(a[who] for a in values)), Derivatives(*(a[who] for a in slopes))
 
 
-def _begin(problem: Problem, x: np.ndarray, values: Values, slopes: Derivatives) -> Iterates:
-    """Before the first step. Scales are the largest derivatives."""
-    m, n = x.shape
-    finite = _finite(values, *slopes)
-    steepest = np.abs(np.where(finite[:, None], slopes.gradient, 0.0)).max(1)
-    cost_scale = np.where(steepest > 0, steepest, 1.0)
-    steepest = np.abs(np.where(finite[:, None, None], slopes.jacobian, 0.0)).max(2)
-    row_scale = np.where(steepest > 0, np.maximum(steepest, _LEAST_SCALE), 1.0)
-    q = row_scale.shape[1]
-    return Iterates(
-        x=x.copy(),
-        f=np.full(m, np.inf),
-        c=np.zeros((m, q)),
-        gradient=np.zeros((m, n)),
-        jacobian=np.zeros((m, q, n)),
-        cost_scale=cost_scale,
-        row_scale=row_scale,
-        hessian=np.tile(np.eye(n), (m, 1, 1)),
-        fresh=np.ones(m, bool),
-        damping=np.ones(m),
-        multipliers=np.zeros((m, q)),
-        penalty=np.zeros((m, q)),
-        restoring=np.zeros(m, bool),
-        step=np.zeros((m, n)),
-        reduction=np.zeros(m),
-        rounding=np.zeros(m),
-        here=np.full(m, np.inf),
-        trial=x.copy(),
-        chosen=np.ones(m, bool),
-        slope=np.full(m, np.inf),
-        steps=np.zeros(m, int),
-        stalled_steps=np.zeros(m, int),
-        arrived=np.zeros(m, bool),
-        restarts=np.zeros(m, int),
-        nearest=[None] * m,
-        status=np.where(finite, RUNNING, Status.NOT_FINITE),
-        equalities=problem.programs.equalities,
-    )
-
-
-def _finite(values: Values, gradient: np.ndarray, jacobian: np.ndarray) -> Bool[np.ndarray, " r"]:
-    parts = (values.cost[:, None], values.rows, gradient, jacobian.reshape(len(gradient), -1))
-    return np.asarray(np.stack([np.isfinite(part).all(1) for part in parts]).all(0))
-
-
 def _move(
-    problem: Problem,
+    problem: ScaledProblem,
     run: Iterates,
     to: np.ndarray,
     values: Values,
@@ -216,14 +93,14 @@ def _move(
     taken: np.ndarray,
 ) -> None:
     """Go to the trial points, measure the curvature on the way, and see who has arrived."""
-    before = _lagrangian_gradient(run, to)
+    before = lagrangian_gradient(run, to)
     change = run.trial[to] - run.x[to]
     run.x[to], run.f[to], run.c[to] = run.trial[to], values.cost[taken], values.rows[taken]
     run.gradient[to], run.jacobian[to] = gradient[taken], jacobian[taken]
     # curvature of the Lagrangian, with the multipliers of the program that led here
     begun = run.steps[to] > 0
     measured = begun & ~run.restoring[to]
-    turn = _lagrangian_gradient(run, to) - before
+    turn = lagrangian_gradient(run, to) - before
     who = to[measured]
     run.hessian[who], run.fresh[who] = update(run.hessian[who], run.fresh[who], change[measured], turn[measured])
     run.damping[to], run.chosen[to] = 1.0, False
@@ -231,13 +108,13 @@ def _move(
     short = begun & (np.abs(change).max(1, initial=0.0) < _STILL)
     run.stalled_steps[to] = np.where(short, run.stalled_steps[to] + 1, 0)
     run.status[to[run.stalled_steps[to] >= _PATIENCE]] = Status.STALLED
-    run.slope[to] = _stationarity(problem, run, to)
-    met = _met(problem, run, to)
+    run.slope[to] = stationarity_of(problem, run, to)
+    met = within_tolerances(problem, run, to)
     run.status[to[met & run.arrived[to]]] = Status.CONVERGED
     run.arrived[to] = met
 
 
-def _search(problem: Problem, run: Iterates, who: np.ndarray, ahead: np.ndarray) -> Int[np.ndarray, " f"]:
+def _search(problem: ScaledProblem, run: Iterates, who: np.ndarray, ahead: np.ndarray) -> Int[np.ndarray, " f"]:
     """Look for a better point between x and trial points that were not good enough; return those without one.
 
     These begin again with a multiple of the identity as B, ten times larger at every failure in a row.
@@ -248,7 +125,7 @@ def _search(problem: Problem, run: Iterates, who: np.ndarray, ahead: np.ndarray)
     run.trial[look[found]] = trial[found]
     run.chosen[look[found]] = True
     failed = np.concatenate([who[lost], look[~found]])
-    run.status[failed[_met(problem, run, failed)]] = Status.CONVERGED
+    run.status[failed[within_tolerances(problem, run, failed)]] = Status.CONVERGED
     failed = failed[run.status[failed] == RUNNING]
     run.damping[failed] = np.where(run.fresh[failed], 10 * run.damping[failed], 1.0)
     run.hessian[failed] = run.damping[failed, None, None] * np.eye(run.x.shape[1])
@@ -257,7 +134,7 @@ def _search(problem: Problem, run: Iterates, who: np.ndarray, ahead: np.ndarray)
     return failed
 
 
-def _solve(problem: Problem, run: Iterates, who: np.ndarray) -> None:
+def _solve(problem: ScaledProblem, run: Iterates, who: np.ndarray) -> None:
     """Solve the quadratic programs at x, see who has arrived, and propose the full steps."""
     low, high = problem.lower[who] - run.x[who], problem.upper[who] - run.x[who]
     for i, below, above in zip(who, low, high, strict=True):
@@ -275,9 +152,9 @@ def _solve(problem: Problem, run: Iterates, who: np.ndarray) -> None:
     run.steps[who] += 1
     size = np.abs(run.multipliers[who])
     run.penalty[who] = np.maximum(size, 0.5 * (run.penalty[who] + size))
-    run.slope[who] = np.minimum(run.slope[who], _stationarity(problem, run, who))
+    run.slope[who] = np.minimum(run.slope[who], stationarity_of(problem, run, who))
     near = np.abs(run.step[who]).max(1, initial=0.0) <= _ARRIVED
-    run.status[who[near & ~run.restoring[who] & _met(problem, run, who)]] = Status.CONVERGED
+    run.status[who[near & ~run.restoring[who] & within_tolerances(problem, run, who)]] = Status.CONVERGED
 
     run.reduction[who] = predict(run, who)
     run.here[who] = merit(run.f[who], run.c[who], run.penalty[who], run.restoring[who], run.equalities)
@@ -293,7 +170,7 @@ def _program(run: Iterates, i: int, below: np.ndarray, above: np.ndarray) -> Ste
     return solve_quadratic(run.hessian[i], run.gradient[i], run.jacobian[i], run.c[i], run.equalities, below, above)
 
 
-def _move_aside(problem: Problem, run: Iterates, i: int) -> None:
+def _move_aside(problem: ScaledProblem, run: Iterates, i: int) -> None:
     """Leave a local least of the violations, unless that has been done too often."""
     found = float(largest_violation(run.c[i] * run.row_scale[i], run.equalities))
     nearest = run.nearest[i]
@@ -317,19 +194,3 @@ def _return_to_nearest(run: Iterates) -> None:
     for i, nearest in enumerate(run.nearest):
         if nearest is not None and run.status[i] != Status.CONVERGED and nearest[0] < run.violation[i]:
             _, run.x[i], run.f[i], run.c[i] = nearest
-
-
-def _lagrangian_gradient(run: Iterates, who: np.ndarray) -> Float[np.ndarray, "r n"]:
-    return run.gradient[who] + (run.multipliers[who][:, None] @ run.jacobian[who])[:, 0]
-
-
-def _stationarity(problem: Problem, run: Iterates, who: np.ndarray) -> Float[np.ndarray, " r"]:
-    gradient, slack = _lagrangian_gradient(run, who), -run.c[who, run.equalities :]
-    box = problem.lower[who], problem.upper[who]
-    return stationarity(run.x[who], gradient, run.multipliers[who, run.equalities :], slack, *box)
-
-
-def _met(problem: Problem, run: Iterates, who: np.ndarray) -> Bool[np.ndarray, " r"]:
-    """Whether both tolerances are met at x."""
-    worst = largest_violation(run.c[who] * run.row_scale[who], run.equalities)
-    return (worst <= problem.tolerance) & (run.slope[who] <= problem.slope_tolerance)
