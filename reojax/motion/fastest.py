@@ -17,7 +17,8 @@ from reojax._internal.arrays import Array
 from reojax._internal.precision import in_double
 from reojax.collision.refusal import check_clearance
 from reojax.mechanics.holonomy import net_rotation
-from reojax.motion._optimal_control import Apart, Fastest as Fastest, Task, UnknownBox, least_duration
+from reojax.motion._optimal_control import Fastest as Fastest, least_duration
+from reojax.motion._transcription import Apart, Task, UnknownBox
 from reojax.motion.least_time import minimum_time
 from reojax.motion.motor import Motor, check_motors
 from reojax.motion.time_laws import Law, check_law, quintic, trapezoid
