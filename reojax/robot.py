@@ -20,7 +20,7 @@ from reojax._internal.arrays import Array, is_concrete
 from reojax._internal.checks import did_you_mean, instance
 from reojax._internal.entries import Entries
 from reojax._internal.replacements import replacement
-from reojax._internal.robot_checks import check_robot
+from reojax._internal.robot_checks import check_entries
 from reojax._internal.robot_table import one_line, table
 from reojax.capsules import Capsule
 from reojax.manoeuvres import Layout, check_layout
@@ -219,7 +219,7 @@ def make_robot(
     if layout is not None:
         check_layout(layout)
     return Robot(
-        **check_robot(
+        **check_entries(
             mass=mass,
             com=com,
             inertia=inertia,

@@ -105,7 +105,7 @@ def ask_for_degrees(lower: np.ndarray, upper: np.ndarray, names: Sequence[str]) 
             return
 
 
-def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str, Any]:
+def check_entries(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str, Any]:
     """Check the arguments of `make_robot`; return the fields of `Robot`, defaults filled in."""
     for entry, value in {"mass": mass, "axis": axis, **entries}.items():
         if not is_concrete(value):
@@ -123,54 +123,68 @@ def check_robot(*, mass: Any, axis: Any, name: Any, **entries: Any) -> dict[str,
     refuse("mass", mass, mass < 0, "a link's mass must not be negative", " kg", link_names)
     if not mass.any():
         raise ValueError("`mass` is 0 kg for every link; a robot has some mass.")
-    length = np.linalg.norm(axis, axis=1)
-    for k in map(int, np.flatnonzero(np.abs(length - 1) > _TOLERANCE)):
-        raise ValueError(
-            f"axis[{k}] ({joint_names[k]}) is {axis[k].tolist()}, of length {length[k]:.9g}; it must have unit length."
-        )
-
-    def per_joint(entry: str, default: float, **kind: Any) -> np.ndarray:
-        value = entries[entry]
-        return numbers(entry, np.full(joints, default) if value is None else value, (joints,), **kind)
-
-    rotor_inertia = per_joint("rotor_inertia", 0.0)
-    negative = rotor_inertia < 0
-    refuse("rotor_inertia", rotor_inertia, negative, "it must not be negative", " kg m^2", joint_names)
-    lower = per_joint("lower", -np.inf, finite=False)
-    upper = per_joint("upper", np.inf, finite=False)
-    refuse("lower", lower, lower >= upper, "it must be below `upper`", " rad", joint_names)
-    ask_for_degrees(lower, upper, joint_names)
+    axis = _unit_axes(axis, joint_names)
+    motors = _motors_and_limits(entries, joint_names)
     if not isinstance(name, str):
         raise ValueError(f"`name` is {shorten(name)}; it must be a string.")
     fields = {
         "mass": mass,
         "com": numbers("com", entries["com"], (links, 3)),
         "inertia": _inertias(entries["inertia"], link_names),
-        "axis": axis / length[:, None],
+        "axis": axis,
         "anchor": numbers("anchor", entries["anchor"], (joints, 3)),
         "parent": _parents(entries["parent"], joints),
-        "rotor_inertia": rotor_inertia,
-        "gear_ratio": per_joint("gear_ratio", 1.0),
+        "gear_ratio": _per_joint(entries, "gear_ratio", joints, 1.0),
         "rotor_on": _sides(entries["rotor_on"], joints),
-        "lower": lower,
-        "upper": upper,
+        **motors,
         "link_names": link_names,
         "joint_names": joint_names,
         "name": name,
+        "layout": entries["layout"],
     }
-    fields |= _couplings(entries["couplings"], fields["joint_names"])
-    fields |= check_capsules(entries["capsules"], fields["link_names"])
+    fields |= _couplings(entries["couplings"], joint_names)
+    fields |= check_capsules(entries["capsules"], link_names)
     fields["notes"] = (*map(str, listing("notes", entries["notes"], "strings")), *check_energy(fields))
-    if entries["collision_pairs"] is None:
-        fields["collision_pairs"], touching = default_pairs(fields)
-        fields["notes"] += _touching(touching, [fields["link_names"][i] for i in fields["capsule_link"]])
-    else:
-        fields["collision_pairs"] = check_pairs(entries["collision_pairs"], fields["capsule_link"])
-    fields["layout"] = entries["layout"]
+    _add_pairs(fields, entries["collision_pairs"])
     for field in fields.values():
         if isinstance(field, np.ndarray):
             field.setflags(write=False)
     return fields
+
+
+def _per_joint(entries: Mapping[str, Any], entry: str, joints: int, default: float, **kind: Any) -> np.ndarray:
+    value = entries[entry]
+    return numbers(entry, np.full(joints, default) if value is None else value, (joints,), **kind)
+
+
+def _unit_axes(axis: np.ndarray, names: Sequence[str]) -> np.ndarray:
+    """Axes of length one to rounding, refused if they are further from it."""
+    length = np.linalg.norm(axis, axis=1)
+    for k in map(int, np.flatnonzero(np.abs(length - 1) > _TOLERANCE)):
+        raise ValueError(
+            f"axis[{k}] ({names[k]}) is {axis[k].tolist()}, of length {length[k]:.9g}; it must have unit length."
+        )
+    return axis / length[:, None]
+
+
+def _motors_and_limits(entries: Mapping[str, Any], names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Rotor inertias and joint limits."""
+    rotor_inertia = _per_joint(entries, "rotor_inertia", len(names), 0.0)
+    refuse("rotor_inertia", rotor_inertia, rotor_inertia < 0, "it must not be negative", " kg m^2", names)
+    lower = _per_joint(entries, "lower", len(names), -np.inf, finite=False)
+    upper = _per_joint(entries, "upper", len(names), np.inf, finite=False)
+    refuse("lower", lower, lower >= upper, "it must be below `upper`", " rad", names)
+    ask_for_degrees(lower, upper, names)
+    return {"rotor_inertia": rotor_inertia, "lower": lower, "upper": upper}
+
+
+def _add_pairs(fields: dict[str, Any], pairs: Any) -> None:
+    """The pairs of capsules to be kept apart, and a note of those left out because they touch."""
+    if pairs is not None:
+        fields["collision_pairs"] = check_pairs(pairs, fields["capsule_link"])
+        return
+    fields["collision_pairs"], touching = default_pairs(fields)
+    fields["notes"] += _touching(touching, [fields["link_names"][i] for i in fields["capsule_link"]])
 
 
 def _touching(pairs: Sequence[tuple[int, int]], links: Sequence[str]) -> tuple[str, ...]:

@@ -6,6 +6,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from reojax._internal.quaternions import matrix_rows
+
 Kind = Literal["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "ball"]
 
 
@@ -92,14 +94,7 @@ def rotation_of_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
 
 def rotation_of_quaternion(quaternion: np.ndarray) -> np.ndarray:
     """Rotation of a quaternion (w, x, y, z), made unit."""
-    w, x, y, z = np.asarray(quaternion, float) / np.linalg.norm(quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return np.array(matrix_rows(np.asarray(quaternion, float) / np.linalg.norm(quaternion)))
 
 
 def ball_as_hinges(name: str, joint: JointEntry) -> tuple[dict[str, LinkEntry], dict[str, JointEntry]]:

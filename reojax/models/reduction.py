@@ -27,6 +27,10 @@ class Reduced(NamedTuple):
     notes: list[str]
 
 
+_Row = tuple[str, str, str, bool]
+"""Joint, inner group, outer group, and whether it is turned round because the base lies on its child's side."""
+
+
 class _Pose(NamedTuple):
     rotation: np.ndarray
     position: np.ndarray
@@ -137,14 +141,8 @@ def _poses(joints: dict[str, JointEntry], held: dict[str, float], root: str) -> 
     return pose
 
 
-def _order(
-    joints: dict[str, JointEntry], held: dict[str, float], group: dict[str, str], base: str
-) -> list[tuple[str, str, str, bool]]:
-    """Moving joints, each after the joint that carries its inner link, else as the file has them.
-
-    Rows are joint, inner group, outer group, and whether the joint is turned round because the base lies on its
-    child's side.
-    """
+def _order(joints: dict[str, JointEntry], held: dict[str, float], group: dict[str, str], base: str) -> list[_Row]:
+    """Moving joints, each after the joint that carries its inner link, else as the file has them."""
     waiting = {
         name: (group[joint.parent], group[joint.child])
         for name, joint in joints.items()
@@ -162,13 +160,23 @@ def _order(
     return order
 
 
+class _Placed(NamedTuple):
+    """A link of the file in the robot."""
+
+    link: str
+    number: int
+    """Of the robot's link that it is part of."""
+    pose: _Pose
+    """In that link's frame, parallel to the base link's."""
+
+
 def _numbers(
     description: Description,
     joints: dict[str, JointEntry],
     pose: dict[str, _Pose],
     group: dict[str, str],
     base: str,
-    order: list[tuple[str, str, str, bool]],
+    order: list[_Row],
     couplings: dict[str, tuple[str, float, float]],
     gear_ratio: Mapping[str, float],
     rotor_inertia: Mapping[str, float],
@@ -176,61 +184,77 @@ def _numbers(
 ) -> Reduced:
     """All numbers in frames parallel to the base link's, each link's origin on its joint."""
     home = pose[base]
-
-    def seen(link: str) -> _Pose:
-        """Pose in the base link's frame."""
-        return _Pose(home.rotation.T @ pose[link].rotation, home.rotation.T @ (pose[link].position - home.position))
-
+    seen = {
+        link: _Pose(home.rotation.T @ here.rotation, home.rotation.T @ (here.position - home.position))
+        for link, here in pose.items()
+    }
     names = [group[base], *(outer for _, _, outer, _ in order)]
     number = {link: i for i, link in enumerate(names)}
-    origin = [np.zeros(3)]
-    axis, anchor, parent, moving = [], [], [], []
-    for name, inner, _, turned in order:
-        joint = joints[name]
-        child = seen(joint.child)
-        point = child.position + child.rotation @ joint.point
-        axis.append(child.rotation @ joint.axis * (-1 if turned else 1))
-        anchor.append(point - origin[number[inner]])
-        parent.append(number[inner])
-        origin.append(point)
-        moving.append(name)
-    mass = np.zeros(len(names))
-    first, second = np.zeros((len(names), 3)), np.zeros((len(names), 3, 3))
-    bodies = [(number[group[link]], link, seen(link)) for link in description.links if link in group]
-    for i, link, place in bodies:
-        entry = description.links[link]
-        mass[i] += entry.mass
-        first[i] += entry.mass * (place.position + place.rotation @ entry.com - origin[i])
-    com = np.divide(first, mass[:, None], out=np.zeros_like(first), where=mass[:, None] > 0)
-    shapes = []
-    for i, link, place in bodies:
-        entry = description.links[link]
-        arm = place.position + place.rotation @ entry.com - origin[i] - com[i]
-        second[i] += place.rotation @ entry.inertia @ place.rotation.T
-        second[i] += entry.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-        for shape in entry.shapes:
-            where = place.then(shape.rotation, shape.position)
-            moved = shape._replace(rotation=where.rotation, position=where.position - origin[i])
-            shapes.append((i, link, moved))
+    tree, origin = _tree(joints, seen, number, order)
+    placed = []
+    for link in (link for link in description.links if link in group):
+        i, here = number[group[link]], seen[link]
+        placed.append(_Placed(link, i, here._replace(position=here.position - origin[i])))
+    moving = [name for name, *_ in order]
     ratios, rotors = motors(moving, joints, gear_ratio, rotor_inertia, notes)
-    label = [base if i == 0 else name for i, name in enumerate(names)]
     fields = {
-        "mass": mass,
-        "com": com,
-        "inertia": second,
-        "axis": np.array(axis).reshape(-1, 3),
-        "anchor": np.array(anchor).reshape(-1, 3),
-        "parent": parent,
+        **_masses(description, placed, len(names)),
+        **tree,
         "gear_ratio": ratios,
         "rotor_inertia": rotors,
         "rotor_on": ["child" if turned else "parent" for _, _, _, turned in order],
         "lower": [joints[name].lower for name in moving],
         "upper": [joints[name].upper for name in moving],
-        "link_names": label,
+        "link_names": [base, *names[1:]],
         "joint_names": moving,
         "couplings": couplings,
     }
     outside = [name for name in moving if not joints[name].lower <= 0 <= joints[name].upper]
     if outside:
         notes.append(f"theta = 0 is outside of the limits of {shorten(', '.join(outside))[1:-1]}")
-    return Reduced(fields, shapes, notes)
+    return Reduced(fields, _shapes(description, placed), notes)
+
+
+def _tree(
+    joints: dict[str, JointEntry], seen: dict[str, _Pose], number: dict[str, int], order: list[_Row]
+) -> tuple[dict[str, Any], list[np.ndarray]]:
+    """Axes, anchors and parents of the joints, and the origin of each link in the base link's frame."""
+    origin = [np.zeros(3)]
+    axis, anchor, parent = [], [], []
+    for name, inner, _, turned in order:
+        joint = joints[name]
+        child = seen[joint.child]
+        point = child.position + child.rotation @ joint.point
+        axis.append(child.rotation @ joint.axis * (-1 if turned else 1))
+        anchor.append(point - origin[number[inner]])
+        parent.append(number[inner])
+        origin.append(point)
+    fields = {"axis": np.array(axis).reshape(-1, 3), "anchor": np.array(anchor).reshape(-1, 3), "parent": parent}
+    return fields, origin
+
+
+def _masses(description: Description, placed: list[_Placed], links: int) -> dict[str, np.ndarray]:
+    """Mass, centre of mass and inertia about it of the robot's links, summed over what each is made of."""
+    mass, first, second = np.zeros(links), np.zeros((links, 3)), np.zeros((links, 3, 3))
+    for link, i, pose in placed:
+        entry = description.links[link]
+        mass[i] += entry.mass
+        first[i] += entry.mass * (pose.position + pose.rotation @ entry.com)
+    com = np.divide(first, mass[:, None], out=np.zeros_like(first), where=mass[:, None] > 0)
+    for link, i, pose in placed:
+        entry = description.links[link]
+        arm = pose.position + pose.rotation @ entry.com - com[i]
+        # turned into the link's frame, and moved to the common centre (Steiner)
+        second[i] += pose.rotation @ entry.inertia @ pose.rotation.T
+        second[i] += entry.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return {"mass": mass, "com": com, "inertia": second}
+
+
+def _shapes(description: Description, placed: list[_Placed]) -> list[tuple[int, str, Shape]]:
+    """The shapes of all links, in the frames of the robot's."""
+    shapes = []
+    for link, i, pose in placed:
+        for shape in description.links[link].shapes:
+            here = pose.then(shape.rotation, shape.position)
+            shapes.append((i, link, shape._replace(rotation=here.rotation, position=here.position)))
+    return shapes
