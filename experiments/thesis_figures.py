@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from common.script import options, run
-from thesis import claims as claims, pictures as pictures
+from thesis import claim_table, claims, pictures as pictures
 from thesis.curvature import Errors, study
 from thesis.grids import FULL_BEND, FULL_TWIST, Grid, sweeps
 from thesis.measure import FULL_A, FULL_B, measure
@@ -51,10 +51,10 @@ def main(out: Path, *, quick: bool = False) -> dict:
 
     numbers = measure(grids, a.rotation, quick=quick)
     judged = claims.judge(numbers)
-    print(claims.text(judged))
+    print(claim_table.text(judged))
     print("\n" + "\n".join(errors_table(errors)))
     with replacing(words) as file:
-        file.write((claims.markdown(judged) + "\n" + "\n".join(errors_table(errors)) + "\n").encode())
+        file.write((claim_table.markdown(judged) + "\n" + "\n".join(errors_table(errors)) + "\n").encode())
     result = {
         "quick": quick,
         "claims": [claim._asdict() for claim in judged],

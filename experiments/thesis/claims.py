@@ -1,37 +1,24 @@
 """The claims of the thesis's simulation sections, each with its verdict, worked out from measured numbers."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
-
-
-class Claim(NamedTuple):
-    """A claim, and what became of it."""
-
-    section: str
-    """Where the thesis makes it."""
-    text: str
-    """What it says."""
-    figure: str
-    """Picture or measurement that tests it."""
-    result: str
-    """What reojax gets."""
-    agrees: bool | None
-    """The verdict; None if it was not tested."""
-    why: str
-    """Where it does not agree or was not tested, why; else what to know."""
-
-    @property
-    def verdict(self) -> str:
-        """In a word."""
-        return {True: "yes", False: "no", None: "not tested"}[self.agrees]
+from thesis.claim_table import LEFT_OUT, Claim
+from thesis.drop_tower_claims import drop_tower_claims, torque_speed_claims
 
 
 def judge(n: dict[str, float]) -> list[Claim]:
-    """Judge every claim by the numbers of `measure_part.measure`."""
-    return [*_manoeuvres(n), *_amplitudes(n), *_design(n), *_structure(n), *_experiment(n)]
-
-
-LEFT_OUT = "left out by --quick"
+    """Judge every claim by the numbers of `measure.measure`."""
+    parts = (
+        _manoeuvres,
+        _amplitudes,
+        _end_links,
+        _motors,
+        _inertias,
+        _symmetries,
+        _small_amplitudes,
+        _one_rectangle,
+        torque_speed_claims,
+        drop_tower_claims,
+    )
+    return [claim for part in parts for claim in part(n)]
 
 
 def _manoeuvres(n: dict[str, float]) -> list[Claim]:
@@ -121,7 +108,7 @@ def _amplitudes(n: dict[str, float]) -> list[Claim]:
     ]
 
 
-def _design(n: dict[str, float]) -> list[Claim]:
+def _end_links(n: dict[str, float]) -> list[Claim]:
     return [
         Claim(
             "2.7, fig 2.8",
@@ -148,6 +135,11 @@ def _design(n: dict[str, float]) -> list[Claim]:
             n["end_tip_least_step_deg"] > 0,
             "",
         ),
+    ]
+
+
+def _motors(n: dict[str, float]) -> list[Claim]:
+    return [
         Claim(
             "2.7, fig 2.9",
             "A higher gear ratio increases the net rotation",
@@ -165,6 +157,11 @@ def _design(n: dict[str, float]) -> list[Claim]:
             n["rotor_least_step_deg"] > 0,
             "only ratio times inertia counts",
         ),
+    ]
+
+
+def _inertias(n: dict[str, float]) -> list[Claim]:
+    return [
         Claim(
             "2.7.2",
             "Middle links whose inertia grows without bound end in no reorientation",
@@ -184,8 +181,7 @@ def _design(n: dict[str, float]) -> list[Claim]:
     ]
 
 
-def _structure(n: dict[str, float]) -> list[Claim]:
-    thin = n.get("one_rectangle_within_3_deg")
+def _symmetries(n: dict[str, float]) -> list[Claim]:
     return [
         Claim(
             "2.4",
@@ -219,6 +215,11 @@ def _structure(n: dict[str, float]) -> list[Claim]:
             n["half_turn_b_off_axis_deg"] < 1e-7 < n["half_turn_b_deg"],
             "so B's off-axis part comes from the centre rotor alone",
         ),
+    ]
+
+
+def _small_amplitudes(n: dict[str, float]) -> list[Claim]:
+    return [
         Claim(
             "2.7",
             "Small amplitudes: A grows as twist × bend²",
@@ -244,6 +245,12 @@ def _structure(n: dict[str, float]) -> list[Claim]:
             _near(n["b_power_of_twist"], 1) and _near(n["b_power_of_bend"], 1),
             "",
         ),
+    ]
+
+
+def _one_rectangle(n: dict[str, float]) -> list[Claim]:
+    thin = n.get("one_rectangle_within_3_deg")
+    return [
         Claim(
             "2.9",
             "One rectangle with free amplitudes reaches only a thin part of all orientations, some 2 % within 3°",
@@ -255,94 +262,5 @@ def _structure(n: dict[str, float]) -> list[Claim]:
     ]
 
 
-def _experiment(n: dict[str, float]) -> list[Claim]:
-    margins = {t: n.get(f"margin_at_{t}_ms") for t in (110, 100, 90, 80)}
-    known = {t: m for t, m in margins.items() if m is not None}
-    return [
-        Claim(
-            "1.8, fig 3.2",
-            "Centre joint, first step: 110 and 100 ms leave the motor under-used, 90 ms uses it well, 80 ms too much",
-            "120° by a quintic, RE-max 17",
-            "room to the torque-speed line " + ", ".join(f"{m:+.2f} at {t} ms" for t, m in known.items())
-            if known
-            else "",
-            known[80] < 0 <= known[90] < known[100] < known[110] if known else None,
-            f"room in stall torques. Speed alone agrees: {n['speed_at_90_ms']:.0%} of no load at 90 ms, "
-            f"{n['speed_at_80_ms']:.0%} at 80. The load, {n['centre_inertia_kg_mm2']:.0f} kg mm² at the bent joint, "
-            "comes from chosen masses and sizes, as the thesis publishes none; winding and law are assumed, too"
-            if known
-            else LEFT_OUT,
-        ),
-        Claim(
-            "1.8, fig 1.9",
-            "In the drop tower A rolled the robot by +3.35 rad; simulation and measurement differ by 0.24 rad RMS",
-            "1.9",
-            f"{n['a_roll_rad']:.2f} rad, {n['a_measured_miss_rad']:.2f} less",
-            n["a_measured_miss_rad"] < 0.24,
-            "roll is the sum of first and third ZXZ angle, as the second returns to zero",
-        ),
-        Claim(
-            "1.8, fig 1.9",
-            "The second ZXZ angle returns to zero",
-            "1.9",
-            f"{n['a_tip_deg']:.1f}°, within the 0.21 rad RMS of the measurement",
-            n["a_tip_deg"] < 12,
-            "",
-        ),
-        Claim(
-            "1.8, fig 1.9",
-            "The third ZXZ angle returns to zero",
-            "1.9",
-            f"first and third end at {n['a_first_zxz_deg']:.0f}° and {n['a_third_zxz_deg']:.0f}°",
-            abs(n["a_third_zxz_deg"]) < 12,
-            "where the second angle is near zero only the sum of first and third means anything, and how it is shared "
-            "is a convention; here the third is carried over from the last larger tilt",
-        ),
-        Claim(
-            "fig 1.9",
-            "Joints run 0..270°, 0..-120°, 0..-270°",
-            "1.9",
-            f"bend +120° rolls by {n['a_roll_deg']:.0f}°, bend -120° by {n['other_bend_roll_deg']:.0f}°",
-            abs(n["other_bend_roll_deg"] - 180) < 12,
-            "the sign of the bend axis is unpublished; here positive bend folds the robot over its feet, and that is "
-            "the way with half a turn",
-        ),
-        Claim(
-            "1.8, fig 1.9",
-            "RMS error of the simulated angles 0.24, 0.21, 0.14 rad",
-            "none",
-            "",
-            None,
-            "the measured histories are not published as numbers",
-        ),
-    ]
-
-
 def _near(power: float, wanted: int) -> bool:
     return abs(power - wanted) < 0.05
-
-
-COLUMNS = ("thesis", "claim", "tested by", "reojax", "agrees", "remark")
-
-
-def markdown(claims: Sequence[Claim]) -> str:
-    """Return the table in Markdown."""
-    rows = [COLUMNS, ("---",) * len(COLUMNS)]
-    rows += [(c.section, c.text, _figure(c.figure), c.result, c.verdict, c.why) for c in claims]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows) + "\n"
-
-
-def text(claims: Sequence[Claim]) -> str:
-    """Return the table for a terminal: two lines a claim, and the remark where it does not agree."""
-    lines = []
-    for c in claims:
-        lines.append(f"{c.verdict:11}{c.section:20}{c.text}")
-        lines.append(f"{'':11}{_figure(c.figure)}: {c.result or '-'}")
-        if c.agrees is not True:
-            lines.append(f"{'':11}why: {c.why}")
-    count = [sum(c.agrees is verdict for c in claims) for verdict in (True, False, None)]
-    return "\n".join([*lines, "", "{} agree, {} do not, {} not tested".format(*count)])
-
-
-def _figure(name: str) -> str:
-    return f"figure {name}" if name[:1].isdigit() and name.replace(".", "").isdigit() else name

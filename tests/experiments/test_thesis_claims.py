@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from thesis import claims as claims, curvature as curved
+from thesis import claim_table, claims, curvature as curved
 
 from reojax import robots
 
@@ -53,14 +53,14 @@ def test_what_was_not_measured_is_not_tested():
 
 def test_no_claim_is_left_out_of_the_table_and_each_failure_has_a_reason():
     judged = claims.judge(Numbers())
-    rows = claims.markdown(judged).splitlines()
+    rows = claim_table.markdown(judged).splitlines()
     assert len(rows) == 2 + len(judged)
-    assert {row.count("|") for row in rows} == {1 + len(claims.COLUMNS)}
+    assert {row.count("|") for row in rows} == {1 + len(claim_table.COLUMNS)}
     for word in ("1.5", "2.4", "2.7.2", "2.8", "2.9", "2.10", "1.9"):
         assert any(word in claim.section for claim in judged)
     untested = [claim for claim in judged if claim.agrees is None]
     assert all(claim.why and claim.verdict == "not tested" for claim in untested)
-    assert f"{len(untested)} not tested" in claims.text(judged)
+    assert f"{len(untested)} not tested" in claim_table.text(judged)
 
 
 def test_the_frame_between_the_middle_links_is_a_change_of_frame():
