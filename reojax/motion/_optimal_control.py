@@ -16,7 +16,7 @@ from reojax.motion.least_time import minimum_stretch
 from reojax.motion.trajectory import Trajectory, stretch
 from reojax.motion.trajectory_clearance import trajectory_clearance
 from reojax.optimisation.optimise import Solution, optimise_together
-from reojax.optimisation.status import Status
+from reojax.optimisation.status import Status, message_of_status
 
 _EXACT = 1e-8
 """Largest error of an answer's net rotation that counts as converged [rad]."""
@@ -62,10 +62,8 @@ class Fastest(NamedTuple):
         """Farthest that a joint goes beyond its limits [rad]."""
         return self.beyond
 
-    @property
-    def message(self) -> str:
-        """Why the optimiser ended, in words."""
-        return Status(int(self.status)).text
+    message = message_of_status
+    """Why the optimiser ended, in words."""
 
 
 class _Answer(NamedTuple):

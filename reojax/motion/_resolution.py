@@ -51,8 +51,16 @@ def target_error(dtype: np.dtype) -> float:
     return 1e-8 if dtype == np.float64 else 1e-4
 
 
-def resolution_status(error: Float[Array, ""] | None, rotation: Float[Array, "m 3 3"]) -> Int[Array, ""]:
-    """Return the `Status` of a motion of that estimated error: out of steps where it is more than is aimed at."""
+@property
+def orientations_found(motion: Any) -> Float[Array, "m 3 3"]:
+    """The orientations: a property for classes of integrated motions, which have `rotation`."""
+    return motion.rotation
+
+
+@property
+def status_by_resolution(motion: Any) -> Int[Array, ""]:
+    """Out of steps where `motion.error` is more than is aimed at: a property for classes of integrated motions."""
+    error, rotation = motion.error, motion.rotation
     if error is None:
         raise ValueError("this motion has no `error`: nothing is known of its accuracy.")
     fine = jnp.where(error <= target_error(np.dtype(rotation.dtype)), Status.CONVERGED, Status.OUT_OF_STEPS)

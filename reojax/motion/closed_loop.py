@@ -32,7 +32,7 @@ from reojax.motion.driven_joints import joint_acceleration, saturate
 from reojax.motion.motor import Motor, check_motors, drive, per_joint
 from reojax.motion.pid import Gains, check_gains
 from reojax.motion.trajectory import Trajectory
-from reojax.optimisation.status import Status
+from reojax.optimisation.status import Status, converged_by_status, message_of_status
 from reojax.robot import Robot
 
 COUNTS = 512.0
@@ -88,15 +88,10 @@ class Tracking(NamedTuple):
         held = jnp.where(self.saturated.any(), Status.SATURATED, Status.CONVERGED)
         return jnp.where(jnp.isfinite(self.theta).all(), held, Status.NOT_FINITE)
 
-    @property
-    def converged(self) -> Bool[Array, ""]:
-        """Whether the motors gave all that was asked for, and all numbers are finite."""
-        return self.status == Status.CONVERGED
-
-    @property
-    def message(self) -> str:
-        """How it ended, in words."""
-        return Status(int(self.status)).text
+    converged = converged_by_status
+    """Whether the motors gave all that was asked for, and all numbers are finite."""
+    message = message_of_status
+    """How it ended, in words."""
 
 
 def track(

@@ -25,7 +25,7 @@ from reojax.mechanics.own_units import without_names
 from reojax.motion.motor import Motor, check_motors, demand, per_joint
 from reojax.motion.time_laws import Law, check_law
 from reojax.motion.trajectory import State, Trajectory, along, polynomial
-from reojax.optimisation.status import Status
+from reojax.optimisation.status import Status, message_of_status
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -86,10 +86,8 @@ class LeastTime(NamedTuple):
         """Whether the durations are finite."""
         return jnp.isfinite(self.duration)
 
-    @property
-    def message(self) -> str:
-        """How it ended, in words."""
-        return Status(int(self.status)).text
+    message = message_of_status
+    """How it ended, in words."""
 
 
 def minimum_time(

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
@@ -30,16 +30,17 @@ from reojax.mechanics.own_units import without_names
 from reojax.motion._resolution import (
     Resolution,
     error_by_halving,
+    orientations_found,
     over_nodes,
     quietly,
     refine,
-    resolution_status,
     spin_bounds,
     start_count,
+    status_by_resolution,
     target_error,
 )
 from reojax.motion.trajectory import Trajectory, polynomial
-from reojax.optimisation.status import Status
+from reojax.optimisation.status import converged_by_status, message_of_status
 from reojax.robot import Robot
 
 DEFAULT_SAMPLES = 32
@@ -73,25 +74,14 @@ class Released(NamedTuple):
     error: Float[Array, ""]
     """Estimate of how far any `rotation` may be wrong by the steps taken, not by the robot's numbers [rad]."""
 
-    @property
-    def value(self) -> Float[Array, "m 3 3"]:
-        """The orientations, under the name that all solvers' results have."""
-        return self.rotation
-
-    @property
-    def status(self) -> Int[Array, ""]:
-        """Converged where `error` is what steps that are chosen aim at; else out of steps, or not finite."""
-        return resolution_status(self.error, self.rotation)
-
-    @property
-    def converged(self) -> Bool[Array, ""]:
-        """Whether `error` is below 1e-8 rad (1e-4 in float32)."""
-        return self.status == Status.CONVERGED
-
-    @property
-    def message(self) -> str:
-        """How it ended, in words."""
-        return Status(int(self.status)).text
+    value = orientations_found
+    """The orientations, under the name that all solvers' results have."""
+    status = status_by_resolution
+    """Converged where `error` is what steps that are chosen aim at; else out of steps, or not finite."""
+    converged = converged_by_status
+    """Whether `error` is below 1e-8 rad (1e-4 in float32)."""
+    message = message_of_status
+    """How it ended, in words."""
 
 
 def released(

@@ -51,3 +51,15 @@ def describe(status: Any) -> str | list[str]:
     if codes.ndim:
         return [Status(int(code)).text for code in codes.ravel()]
     return Status(int(codes)).text
+
+
+@property
+def converged_by_status(result: Any) -> Any:
+    """Whether it converged: a property for classes of results that have a `status`."""
+    return result.status == Status.CONVERGED
+
+
+@property
+def message_of_status(result: Any) -> Any:
+    """How it ended, in words; of many a list: a property for classes of results that have a `status`."""
+    return describe(result.status)
