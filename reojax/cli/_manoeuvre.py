@@ -1,7 +1,7 @@
 """What the subcommands that run a manoeuvre share: its options, its path, and how it is called."""
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from reojax.cli._numbers import degrees
 from reojax.cli._plan_file import add_plan_file, saved_plan
@@ -65,6 +65,17 @@ def path_of(robot: "Robot", args: argparse.Namespace) -> "Path":
     from reojax.manoeuvres import BY_NAME
 
     return BY_NAME[args.manoeuvre](np.deg2rad(args.twist), np.deg2rad(args.bend), layout_of(robot))
+
+
+def config_of(args: argparse.Namespace) -> dict[str, Any]:
+    """What a report says of the manoeuvre or the plan that was run."""
+    return {
+        "robot": args.robot,
+        "plan": args.plan,
+        "manoeuvre": args.manoeuvre,
+        "twist_deg": args.twist,
+        "bend_deg": args.bend,
+    }
 
 
 def edge_names(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[str, ...]:

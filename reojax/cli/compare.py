@@ -11,6 +11,7 @@ from reojax.cli._limits import joints_beyond_limits, limits_text
 from reojax.cli._manoeuvre import add_amplitudes, path_of
 from reojax.cli._numbers import TIME, number
 from reojax.cli._page import add_page, check_page, write_page
+from reojax.cli._picture import add_picture, check_picture
 from reojax.cli._planned import add_timing, plan_motion
 from reojax.cli._robot import add_robot, robot_of
 
@@ -34,13 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     fitted = "fit these numbers of the robot to the capture first, such as end_inertia,rotor_inertia or com[0,2]"
     add("--calibrate", metavar="NAMES", help=fitted)
     add("--json", action="store_true", help="print one JSON object, with all digits")
-    add(
-        "--picture",
-        "--out",
-        dest="out",
-        metavar="FIGURE",
-        help="draw measured and simulated angles to a .png, .pdf or .svg",
-    )
+    add_picture(parser, "measured and simulated angles")
     add_page(parser, "the simulated motion with the measured one as its ghost")
 
 
@@ -51,8 +46,7 @@ def run(args: argparse.Namespace) -> None:
 
     session.start()
     try:
-        if args.out is not None:
-            _check_picture(args.out)
+        check_picture(args)
         check_page(args)
         robot = robot_of(args.robot)
         capture = read_capture(args.capture, robot, angle_unit=args.angles)
@@ -63,12 +57,6 @@ def run(args: argparse.Namespace) -> None:
     except ValueError as error:
         raise BadInput(f"reojax compare: {error}") from error
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(report))
-
-
-def _check_picture(out: str) -> None:
-    from reojax import plot
-
-    plot.check_picture(out)
 
 
 def _draw(robot: "Robot", comparison: "Comparison", args: argparse.Namespace) -> None:

@@ -9,7 +9,7 @@ from reojax._internal.version import version
 from reojax.cli._arguments import BadInput
 from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
 from reojax.cli._limits import joints_beyond_limits, limits_text
-from reojax.cli._manoeuvre import add_manoeuvre, robot_and_path
+from reojax.cli._manoeuvre import add_manoeuvre, config_of, robot_and_path
 from reojax.cli._numbers import RATE, TIME, from_zero
 from reojax.cli._planned import add_timing, plan_motion
 
@@ -71,11 +71,7 @@ def _write(robot: "Robot", path: "Path", args: argparse.Namespace) -> dict[str, 
         "command": "export",
         "version": version(),
         "config": {
-            "robot": args.robot,
-            "plan": args.plan,
-            "manoeuvre": args.manoeuvre,
-            "twist_deg": args.twist,
-            "bend_deg": args.bend,
+            **config_of(args),
             "law": args.law,
             "rate_hz": args.rate,
             "delay_s": args.delay,

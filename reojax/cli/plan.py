@@ -10,6 +10,7 @@ from reojax.cli._clearance import add_clearance
 from reojax.cli._free import add_free, asked, free
 from reojax.cli._numbers import degrees, whole
 from reojax.cli._page import add_page, check_page, write_page
+from reojax.cli._picture import add_picture, check_picture
 from reojax.cli._robot import add_robot, robot_of
 
 if TYPE_CHECKING:
@@ -44,13 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_clearance(parser, "kept and proven along the whole path")
     add("--save", metavar="PLAN.json", help="write robot, path, target and certificate, for `reojax simulate --plan`")
     add("--json", action="store_true", help="print one JSON object, with all digits")
-    add(
-        "--picture",
-        "--out",
-        dest="out",
-        metavar="FIGURE",
-        help="draw the orientation on its way to a .png, .pdf or .svg",
-    )
+    add_picture(parser, "the orientation on its way")
     add("--animate", metavar="FILM", help="draw the robot on its way to an .mp4 (needs ffmpeg) or a .gif")
     add_page(parser, "the robot on its way")
     add("--csv", metavar="FILE", help="write the corners of the joint path, in degrees, to a .csv")
@@ -141,13 +136,11 @@ def _choose(robot: "Robot", args: argparse.Namespace) -> None:
 def _check_files(args: argparse.Namespace) -> None:
     from reojax._internal.files import check_ending, check_writable
 
-    if args.out is not None or args.animate is not None:
+    check_picture(args)
+    if args.animate is not None:
         from reojax import plot
 
-        if args.out is not None:
-            plot.check_picture(args.out)
-        if args.animate is not None:
-            plot.check_animation(args.animate)
+        plot.check_animation(args.animate)
     if args.save is not None:
         check_ending(args.save, "plan", ("json",))
     if args.csv is not None:

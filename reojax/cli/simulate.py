@@ -9,10 +9,11 @@ from reojax._internal.version import version
 from reojax.cli._arguments import BadInput
 from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
 from reojax.cli._limits import joints_beyond_limits, limits_text
-from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path
+from reojax.cli._manoeuvre import add_manoeuvre, config_of, edge_names, heading, robot_and_path
 from reojax.cli._motion import LAW, check_law, motion_of, motion_report, motion_text
 from reojax.cli._motors import add_motors, momentum
 from reojax.cli._page import add_page, check_page, write_page
+from reojax.cli._picture import add_picture, check_picture
 from reojax.cli._planned import add_duration
 
 if TYPE_CHECKING:
@@ -34,13 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--momentum", type=momentum, metavar="X,Y,Z", help=spin)
     add_clearance(parser, "proven along the whole path, or exit 1")
     add("--json", action="store_true", help="print one JSON object, with all digits")
-    add(
-        "--picture",
-        "--out",
-        dest="out",
-        metavar="FIGURE",
-        help="draw orientation and joint angles to a .png, .pdf or .svg",
-    )
+    add_picture(parser, "orientation and joint angles")
     add_page(parser, "the turn")
 
 
@@ -52,8 +47,7 @@ def run(args: argparse.Namespace) -> None:
     try:
         robot, path = robot_and_path(args)
         check_law(args)
-        if args.out is not None:
-            _check_picture(args.out)
+        check_picture(args)
         check_page(args)
         motion = motion_of(robot, path, args)
         report, history = _report(robot, path, args)
@@ -68,12 +62,6 @@ def run(args: argparse.Namespace) -> None:
     print(json.dumps(report, indent=2, allow_nan=False) if args.json else _text(report, args))
     if report["clearance"] is not None and not report["clearance"]["kept"]:
         sys.exit(1)
-
-
-def _check_picture(out: str) -> None:
-    from reojax import plot
-
-    plot.check_picture(out)
 
 
 def _title(args: argparse.Namespace) -> str:
@@ -128,11 +116,7 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
         "command": "simulate",
         "version": version(),
         "config": {
-            "robot": args.robot,
-            "plan": args.plan,
-            "manoeuvre": args.manoeuvre,
-            "twist_deg": args.twist,
-            "bend_deg": args.bend,
+            **config_of(args),
             "steps_per_edge": steps,
             "samples_per_edge": samples,
         },

@@ -10,8 +10,9 @@ from reojax._internal.version import version
 from reojax.cli._arguments import BadInput
 from reojax.cli._clearance import add_clearance, clearance_report, clearance_text
 from reojax.cli._limits import joints_beyond_limits, limits_text
-from reojax.cli._manoeuvre import add_manoeuvre, edge_names, heading, robot_and_path
+from reojax.cli._manoeuvre import add_manoeuvre, config_of, edge_names, heading, robot_and_path
 from reojax.cli._motors import add_motors, motor_of
+from reojax.cli._picture import add_picture, check_picture
 
 if TYPE_CHECKING:
     from reojax.motion.simulation import Motion
@@ -25,9 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_motors(parser, law="quintic")
     add_clearance(parser, "proven along the whole path, or exit 1")
     parser.add_argument("--json", action="store_true", help="print one JSON object, with all digits")
-    parser.add_argument(
-        "--picture", "--out", dest="out", metavar="FIGURE", help="draw the torque-speed picture to a .png, .pdf or .svg"
-    )
+    add_picture(parser, "the torque-speed picture")
 
 
 def run(args: argparse.Namespace) -> None:
@@ -39,10 +38,7 @@ def run(args: argparse.Namespace) -> None:
     try:
         by_name(args.law)
         robot, path = robot_and_path(args)
-        if args.out is not None:
-            from reojax import plot
-
-            plot.check_picture(args.out)
+        check_picture(args)
         report, motion = _report(robot, path, args)
         report["clearance"] = clearance_report(robot, path, args)
         if args.out is not None and motion is not None:
@@ -87,11 +83,7 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
         "command": "time",
         "version": version(),
         "config": {
-            "robot": args.robot,
-            "plan": args.plan,
-            "manoeuvre": args.manoeuvre,
-            "twist_deg": args.twist,
-            "bend_deg": args.bend,
+            **config_of(args),
             "law": args.law,
             "supply_V": args.supply,
             "resistance_ohm": args.resistance,
