@@ -28,15 +28,15 @@ from common.motors import motors_of
 from common.script import options, run
 from common.tables import gradient_error, least_travel, summary, table
 from design_opt_parts import any_robot, constrained
+from design_opt_parts.manoeuvre_a import INERTIA, RATIO, joint_travel, manoeuvre_problem
 from matplotlib.figure import Figure
 
 import reojax
 from reojax import design, plot, so3
-from reojax.design import Problem, Variable
 from reojax.files import check_writable, write_json
-from reojax.robots import prototype, with_end_inertia, with_gear_ratio
+from reojax.robots import prototype
 
-LOWER, UPPER = np.array([10.0, 1.0]), np.array([190.0, 48.0])
+LOWER, UPPER = np.transpose([INERTIA, RATIO])
 """End link inertia [kg mm^2] and gear ratio."""
 THESIS = np.array([70.0, 24.0])
 ROTOR = 0.1
@@ -166,20 +166,7 @@ def best_loops(roll: float, *, quick: bool, clearance: float | None = None) -> l
 def trade_off(roll: float, *, points: int) -> dict[str, dict[str, Any]]:
     """Least travel over the end link inertia, and over the gear ratio, with the other one as in the thesis or free."""
     names = ("end inertia [kg mm^2]", "gear ratio")
-    problem = Problem(
-        lambda values: (
-            with_gear_ratio(with_end_inertia(prototype(), values["inertia"]), values["ratio"]),
-            reojax.manoeuvre_a(values["twist"], values["bend"]),
-        ),
-        [
-            Variable("twist", 0, 270, "deg"),
-            Variable("bend", 0, 120, "deg"),
-            Variable("inertia", LOWER[0], UPPER[0], "kg mm^2"),
-            Variable("ratio", LOWER[1], UPPER[1]),
-        ],
-        objective=lambda outcome: 4 * outcome.values["twist"] + 2 * outcome.values["bend"],
-        equality=[design.turned_about([0, 0, 1], roll)],
-    )
+    problem = manoeuvre_problem(roll, joint_travel)
     grids = [np.unique(np.append(np.linspace(LOWER[k], UPPER[k], points), THESIS[k])) for k in (0, 1)]
     # one problem a row: the parameter on the axis, the other one as in the thesis or free (NaN)
     held = []
