@@ -69,6 +69,7 @@ def align(capture: Capture, motion: Simulated) -> tuple[float, bool]:
 
 def align_frames(measured: Float[np.ndarray, "m 3 3"], simulated: Float[np.ndarray, "m 3 3"]) -> np.ndarray:
     """Rotation `G` for which `measured = G simulated` fits best, by least squares of the matrices."""
+    # the rotation nearest to the sum of `measured simulated^T` (Kabsch)
     u, _, v = np.linalg.svd(np.einsum("mab,mcb->ac", measured, simulated))
     return u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v
 

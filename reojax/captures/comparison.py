@@ -183,15 +183,18 @@ def _check_joints(robot: Robot, capture: Capture) -> None:
 def _comparison(capture: Capture, motion: Sampled, offset: float, found: bool) -> Comparison:
     time = capture.time - offset
     frames = len(time)
+    # the motion at the capture's times, from its own start
     simulated = interpolate(motion.time, motion.rotation)(time)
     start = motion.rotation[0]
     simulated = start.T @ simulated
     theta = np.stack([np.interp(time, motion.time, column) for column in motion.theta.T], axis=1)
+    # what the cameras saw, in the frame of the robot's start
     seen = capture.seen_rotation
     measured = np.full((frames, 3, 3), np.nan) if capture.rotation is None else np.array(capture.rotation)
     measured[~seen] = np.nan
     if seen.any():
         measured = _frame(measured[seen], simulated[seen]).T @ measured
+    # angles of both, the measured ones brought next to the simulated
     zxz, angles = zxz_without_jumps(simulated), tilt_and_roll(simulated)
     measured_angles = np.full((frames, 3), np.nan)
     if seen.any():
@@ -200,6 +203,7 @@ def _comparison(capture: Capture, motion: Sampled, offset: float, found: bool) -
         measured_angles[:, 2] -= 2 * np.pi * turns
     measured_zxz = zxz_beside(measured, zxz)
     joints = np.full_like(theta, np.nan) if capture.theta is None else np.asarray(capture.theta)
+    # cosine of the angle between both, by the trace
     between = 0.5 * (np.einsum("mab,mab->m", measured, simulated) - 1)
     return Comparison(
         offset=offset,

@@ -18,6 +18,7 @@ def tilt_and_roll(rotations: Float[Array, "m 3 3"]) -> Float[np.ndarray, "m 3"]:
     """
     r = np.asarray(rotations, float)
     x, y, z = r[:, 0, 2], r[:, 1, 2], r[:, 2, 2]
+    # the tilt turns z to (x, y, z) about (-y, x, 0), by the angle between them
     level = np.hypot(x, y)
     factor = np.divide(np.arctan2(level, z), level, out=np.ones_like(level), where=level > 0)
     roll = np.unwrap(np.arctan2(r[:, 1, 0] - r[:, 0, 1], r[:, 0, 0] + r[:, 1, 1]))
@@ -54,12 +55,14 @@ def zxz_beside(rotations: Float[Array, "m 3 3"], reference: Float[np.ndarray, "m
     result = np.full((len(reference), 3), np.nan)
     a, b, total = _direction_tilt_sum(np.asarray(rotations, float)[seen])
     near = reference[seen]
+    # of (a, b, c) and (a + pi, -b, c - pi) the one that is nearer
     ways = []
     for turn, tilt in ((a, b), (a + np.pi, -b)):
         first = _nearest(turn, near[:, 0])
         ways.append(np.stack([first, tilt, _nearest(total - first, near[:, 2])], axis=1))
     far = [((way - near) ** 2).sum(axis=1) for way in ways]
     result[seen] = np.where((far[0] <= far[1])[:, None], *ways)
+    # little tilt: c of the reference, a the rest of a + c
     small = seen.copy()
     small[seen] = np.minimum(b, abs(near[:, 1])) < LEVEL
     level = small[seen]

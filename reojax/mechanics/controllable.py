@@ -22,6 +22,7 @@ from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.mechanics.curvature import curvature_terms
 from reojax.mechanics.input_checks import check_motion
+from reojax.mechanics.integrators import GAUSS, magnus6
 from reojax.mechanics.own_units import without_names
 from reojax.robot import Robot
 
@@ -32,7 +33,6 @@ _RAYS, _REACH = 4, 0.2
 """Straight paths to shapes near by, and how far each joint turns on them [rad]."""
 _STEPS = 4
 """Steps of the transport along each ray: an error near 1e-12 of the curvature, far below the tolerance."""
-_GAUSS = np.polynomial.legendre.leggauss(3)[0] / 2 + 0.5
 _TOLERANCE = {8: 1e-9, 4: 1e-4}
 """Share of its own terms from which a component counts, by the bytes of the robot's numbers. Rounding leaves 1e-15 of
 float64 and 1e-7 of float32 terms; a robot of public numbers turns an axis that it has by 1e-6 at the least."""
@@ -80,12 +80,13 @@ def controllable_directions(
 
     # the connection, its slope and its curvature at nodes along rays from the shape, and at the rays' ends
     ray = np.random.default_rng(0).uniform(-_REACH, _REACH, (_RAYS, count))
-    shares = np.append((np.arange(_STEPS)[:, None] + _GAUSS) / _STEPS, 1.0)
+    shares = np.append((np.arange(_STEPS)[:, None] + np.array(GAUSS)) / _STEPS, 1.0)
     shapes = np.concatenate([np.zeros((1, count)), (shares[:, None, None] * ray).reshape(-1, count)])
     with jax.enable_x64(True):
         double = jax.tree.map(lambda leaf: np.array(leaf, float), without_names(robot))
         terms = _terms(double, theta + shapes @ moves.T)
     gamma, slope, field = (np.asarray(part) for part in terms)
+    # by the independent joints alone, every pair once; and how large the terms are that each component is a sum of
     gamma, i, k = gamma @ moves, *np.triu_indices(count, 1)
     field = np.einsum("ki,pakl,lj->paij", moves, field, moves)[:, :, i, k]
     size = np.einsum("ki,pkl,lj->pij", np.abs(moves), np.sqrt((slope**2).sum(1)), np.abs(moves))
@@ -126,19 +127,12 @@ def _terms(robot: Robot, shapes: Array) -> tuple[Array, Array, Array]:
 
 
 def _rotation(omega: Float[np.ndarray, "n 3 3"]) -> Rotation:
-    """Rotation over n steps of `R' = R hat(omega)`, three Gauss nodes each, by the sixth-order Magnus method.
-
-    S. Blanes, F. Casas and J. Ros, BIT 40, 2000, 434-450, for `Y' = A Y`: here `Y = R^T`, `A = -hat(omega)`.
-    """
+    """Rotation over n steps of `R' = R hat(omega)`, three Gauss nodes each, by `magnus6`."""
     from scipy.spatial.transform import Rotation
 
     turned = Rotation.identity()
-    for first, middle, last in -omega / len(omega):
-        a = middle
-        b, c = np.sqrt(15) / 3 * (last - first), 10 / 3 * (last - 2 * middle + first)
-        inner = np.cross(a, b)
-        outer = -np.cross(a, 2 * c + inner) / 60
-        turned = turned * Rotation.from_rotvec(-(a + c / 12 + np.cross(-20 * a - c + inner, b + outer) / 240))
+    for nodes in omega / len(omega):
+        turned = turned * Rotation.from_rotvec(magnus6(*nodes))
     return turned
 
 

@@ -92,6 +92,7 @@ def _rotation_history(robot: Robot, waypoints: Array, samples: int, pattern: Pat
     edges = points.shape[0] - 1
     if not robot.joints or not edges:
         return jnp.tile(jnp.eye(3, dtype=points.dtype), (edges * samples + 1, 1, 1))
+    # more steps than samples where these are few, and of their products those at the samples
     finer = -(-DEFAULT_STEPS // samples)
     step = steps_of_path(robot, pattern, points, samples * finer)
     ends = tuple(q[finer - 1 :: finer] for q in products_up_to(step.rotation))

@@ -101,6 +101,19 @@ def connection_of_pose(robot: Robot, pose: Kinematics) -> Float[Array, "3 j"]:
     return solve_symmetric3(A, B)
 
 
+def velocity_by_momentum(
+    robot: Robot, pose: Kinematics, theta_dot: Float[Array, " j"]
+) -> tuple[Float[Array, "3"], Float[Array, "3 3"]]:
+    """`A^-1 B theta_dot` and `A^-1`, base frame: `omega` is the first plus the second times the momentum.
+
+    Nothing is checked: arrays are finite and of one dtype.
+    """
+    A, B = momentum_matrices_of_pose(robot, pose)
+    columns = jnp.concatenate([(B @ theta_dot)[:, None], jnp.eye(3, dtype=theta_dot.dtype)], axis=1)
+    both = solve_symmetric3(A, columns)
+    return both[:, 0], both[:, 1:]
+
+
 def angular_momentum(
     robot: Robot, theta: Float[Array, " j"], theta_dot: Float[Array, " j"], omega: Float[Array, "3"]
 ) -> Float[Array, "3"]:

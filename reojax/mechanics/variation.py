@@ -66,11 +66,14 @@ def turn_of_instant(
     `omega = A^-1 (B theta' + h)` changes with joint i by `-A^-1 d_i (A omega - B theta')`, velocities held
     (`_momentum_slopes`), and the connection along the motion by `A^-1 (B_dot - A_dot Gamma)`.
     """
+    # Gamma = A^-1 B, omega = A^-1 (B theta' + h)
     h = rotation.T @ momentum
     both = solve_symmetric3(now.A, jnp.concatenate([now.B, (now.B @ theta_dot + h)[:, None]], axis=1))
     gamma, omega = both[:, :-1], both[:, -1]
+    # h x Gamma - d_i (A omega - B theta') - B_dot + A_dot Gamma, under A^-1
     slopes = _momentum_slopes(robot, now, theta_dot, omega)
     right = jnp.cross(h[:, None], gamma, axis=0) - slopes - now.B_dot + now.A_dot @ gamma
+    # and A^-1 hat(h) R^T beside it, for N
     solved = solve_symmetric3(now.A, jnp.concatenate([right, hat(h) @ rotation.T], axis=1))
     count = robot.joints
     return rotation @ (solved[:, :count] + jnp.cross(gamma, omega[:, None], axis=0)), rotation @ solved[:, count:]
@@ -88,12 +91,16 @@ def _momentum_slopes(
     pose, parent = now.pose, np.array(robot.parent, int)
     beyond = jnp.asarray(support_mask(robot).T, omega.dtype)  # (j, n)
     lever = jax.vmap(hat)(pose.com)
+    # motion of each link: w_i = omega + Ja_i theta', v_i = omega x c_i + Jl_i theta'
     spin = omega[None] + pose.angular_jacobian @ theta_dot
     speed = jnp.cross(omega[None], pose.com) + pose.linear_jacobian @ theta_dot
+    # momenta of each link alone, its joint's rotor included: m v_i, and I_i w_i + c_i x m v_i
     linear = robot.mass[:, None] * speed
     own = jnp.einsum("iab,ib->ia", now.inertia, spin) + jnp.cross(pose.com, linear)
     own = own.at[1:].add((robot.rotor_inertia * rotor_spin(robot) * theta_dot)[:, None] * pose.axis)
+    # inertia of each about the robot's centre of mass
     about = now.inertia - jnp.einsum("i,iab,ibc->iac", robot.mass, lever, lever)
+    # summed over all that lies beyond each joint
     h, p = beyond @ own, beyond @ linear
     s = beyond @ (robot.mass[:, None] * pose.com)
     inertia = jnp.einsum("ji,iab->jab", beyond, about)
@@ -102,6 +109,7 @@ def _momentum_slopes(
     e, o, w = pose.axis, pose.origin[1:] - centre[None], spin[parent]
     v = speed[parent] + jnp.cross(w, o - pose.com[parent])
     q = jnp.cross(e, w)
+    # e x h - (e x o) x p - I q + s x (q x o - e x v)
     found = jnp.cross(e, h) - jnp.cross(jnp.cross(e, o), p) - jnp.einsum("jab,jb->ja", inertia, q)
     return (found + jnp.cross(s, jnp.cross(q, o) - jnp.cross(e, v))).T
 

@@ -73,10 +73,16 @@ def error_by_halving(fine: Float[Array, "s+1 3 3"], coarse: Float[Array, "s/2+1 
     NaN where `fine` has a number that is none, infinite where only `coarse` has.
     """
     apart = jax.vmap(lambda a, b: so3.angle(jnp.matmul(a.T, b, precision="highest")))(fine[::2], coarse)
+    # 1 / (2^p - 1) of the difference in the asymptotic regime, all of it beyond; and a margin
     most = apart.max()
     factor = jnp.where(most < _ASYMPTOTIC, SAFETY / (2**order - 1), SAFETY)
     error = jnp.where(jnp.isfinite(coarse).all(), jnp.minimum(factor * most, np.pi), jnp.inf)
     return jax.lax.stop_gradient(jnp.where(jnp.isfinite(fine).all(), error, jnp.nan))
+
+
+def fill_up_half(values: Float[Array, "h ..."]) -> Float[Array, "2*h ..."]:
+    """Values of half the steps, filled up with steps of no length: one loop runs these and all steps side by side."""
+    return jnp.concatenate([values, jnp.zeros_like(values)])
 
 
 def over_nodes(function: Callable[..., Any], *arrays: Array) -> Any:
@@ -129,6 +135,7 @@ def refine(
             return result
         if count >= limit:
             break
+        # how many times as many steps: by the turn in one, else by the error's order
         by_turn = turn / TURN if np.isfinite(turn) else limit
         by_error = (error / target) ** (1 / order) if np.isfinite(error) and by_turn < 4 else 1.0
         more = 2 ** int(np.ceil(np.log2(min(max(by_turn, by_error, 2.0), limit))))
@@ -167,6 +174,7 @@ def spin_bounds(robot: Robot, spin: Array, duration: float) -> tuple[float, floa
     """
     moments = np.linalg.eigvalsh(np.asarray(robot.inertia, float))
     least = moments[:, 0].clip(0).sum()
+    # stretched out, no mass lies farther from the robot's centre than all anchors and a centre of mass in a row
     anchor, com = (np.linalg.norm(np.asarray(x, float), axis=1) for x in (robot.anchor, robot.com))
     most = moments[:, 2].sum() + float(np.asarray(robot.mass).sum()) * (anchor.sum() + com.max()) ** 2
     most += float((np.asarray(robot.rotor_inertia) * np.abs(np.asarray(robot.gear_ratio))).sum())

@@ -125,6 +125,7 @@ def minimum_time(
     _check_fit(robot, trajectory)
     times, place = _instants(without_names(robot), trajectory, motors, _count(samples))
     needs = times.reshape(path.edges, -1, robot.joints)
+    # the slowest instant of each edge, and its joint
     flat = needs.reshape(path.edges, -1)
     worst = jnp.argmax(flat, axis=1)
     share = place.reshape(path.edges, -1) - jnp.arange(path.edges, dtype=place.dtype)[:, None]
@@ -161,6 +162,7 @@ def _instants(robot: Robot, trajectory: Trajectory, motors: Motor, samples: int)
 
     def least(theta: Array, theta_dot: Array, theta_ddot: Array) -> Array:
         load = joint_load(robot, theta, theta_dot, theta_ddot)
+        # a / T^2 + b / T + c is the voltage at T times the duration: both ends of the supply
         a, b, c = demand(robot, motors, theta_dot, load)
         up = _root(motors.supply - c, b.sum(0), a)
         down = _root(motors.supply + c, -b.sum(0), -a)
@@ -179,6 +181,7 @@ def instants(trajectory: Trajectory, samples: int) -> tuple[Float[Array, "p m"],
 
 def _root(supply: Array, b: Array, a: Array) -> Array:
     """Largest positive T with `supply T^2 = b T + a`, 0 without one; infinite if the supply is not positive."""
+    # (b + sqrt(b^2 + 4 supply a)) / (2 supply), safe where there is none
     square = b * b + 4 * supply * a
     real = square > 0
     root = (b + jnp.sqrt(jnp.where(real, square, 1))) / (2 * jnp.where(supply > 0, supply, 1))

@@ -101,6 +101,7 @@ def stall_torque(motor: Motor) -> float | Array:
 def no_load_speed(motor: Motor) -> float | Array:
     """Speed without a load under the full supply, own drag and friction included [rad/s]."""
     motor = _motor(motor)
+    # supply = resistance (drag w + friction) / k + k w
     k, resistance = motor.torque_constant, motor.resistance
     return (motor.supply - resistance * motor.friction / k) / (k + resistance * motor.drag / k)
 
@@ -124,6 +125,7 @@ def drive(robot: Robot, motors: Motor, theta_dot: Float[Array, " j"], load: Load
         theta_dot: (j,) joint rates [rad/s].
         load: what `dynamics.joint_load` gives for the motion.
     """
+    # current = M / k, and the voltage that the turning rotor induces beside it
     squared, linear, constant = demand(robot, motors, theta_dot, load)
     current = (squared + linear[0] + constant) / motors.resistance
     voltage = squared + linear.sum(0) + constant
@@ -156,10 +158,12 @@ def demand(
     """
     ratio = robot.gear_ratio
     speed = ratio * theta_dot
+    # what the gear takes of the load's power, whichever way it flows
     geared = load.torque - load.rotor
     power = geared * theta_dot
     driving = 0.5 * (1 + jnp.tanh(power / soft)) if soft else jnp.where(power >= 0, 1, 0)
     through = geared * (driving / motors.efficiency + (1 - driving) * motors.efficiency_back)
+    # resistance / k times the torque: (through the gear) / N and (rotor) / N, drag w, friction sign(w); and k w
     per_torque = motors.resistance / motors.torque_constant
     inertial = per_torque * (through + load.rotor) / ratio
     linear = jnp.stack([per_torque * motors.drag * speed, motors.torque_constant * speed])

@@ -22,14 +22,14 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
-from reojax._internal.linalg import solve_symmetric3
 from reojax.mechanics.integrators import RK4, runge_kutta_step
 from reojax.mechanics.kinematics import kinematics
-from reojax.mechanics.momentum import momentum_matrices
+from reojax.mechanics.momentum import velocity_by_momentum
 from reojax.mechanics.own_units import without_names
 from reojax.motion._resolution import (
     Resolution,
     error_by_halving,
+    fill_up_half,
     orientations_found,
     over_nodes,
     quietly,
@@ -183,20 +183,22 @@ def _simulate_release(
         substeps *= 2
     time, length, nodes = nodes_of(robot, trajectory, samples * substeps)
     count = len(length)
-    double = jax.tree.map(lambda x: _half(jnp.stack([x[::2, 0], x[::2, 2], x[1::2, 2]], axis=1)), nodes)
+    # all steps and half of them, side by side: start, middle and end of each
+    double = jax.tree.map(fill_up_half, nodes_of_half(nodes))
     both = jax.tree.map(lambda *pair: jnp.stack(pair), nodes, double)
     integrate = jax.vmap(integrate_release, (0, 0, None))  # one loop, compiled once
-    (fine, coarse), (momentum, _) = integrate(jnp.stack([length, _half(2 * length[::2])]), both, release)
+    (fine, coarse), (momentum, _) = integrate(jnp.stack([length, fill_up_half(2 * length[::2])]), both, release)
     error = error_by_halving(fine, coarse[: count // 2 + 1], ORDER)
+    # bound of the turn in a step: |A^-1 B theta_dot| + |A^-1| (|H| + drag)
     size, mobility = jnp.sqrt((momentum[:-1] ** 2).sum(-1)), jnp.sqrt((nodes.mobility**2).sum((-1, -2)).max(1))
     rate = jnp.sqrt((nodes.own**2).sum(-1).max(1)) + mobility * (jnp.where(jnp.isfinite(size), size, 0) + release[9])
     resolution = Resolution(error, jax.lax.stop_gradient((length * rate).max()))
     return Released(time[::substeps], fine[::substeps], momentum[::substeps], error), resolution
 
 
-def _half(values: Array) -> Array:
-    """Values of half the steps, filled up with steps of no length."""
-    return jnp.concatenate([values, jnp.zeros_like(values)])
+def nodes_of_half(nodes: _Node) -> _Node:
+    """The nodes of steps of twice the length, out of those of all steps."""
+    return jax.tree.map(lambda x: jnp.stack([x[::2, 0], x[::2, 2], x[1::2, 2]], axis=1), nodes)
 
 
 def nodes_of(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Array, _Node]:
@@ -208,11 +210,8 @@ def nodes_of(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, A
     state = jax.vmap(jax.vmap(jax.vmap(polynomial, (None, 0)), (None, 0)))(trajectory.coefficients, within)
 
     def node(theta: Array, theta_dot: Array) -> _Node:
-        # A^-1 [B theta_dot, 1]
-        A, B = momentum_matrices(robot, theta)
-        columns = jnp.concatenate([(B @ theta_dot)[:, None], jnp.eye(3, dtype=dtype)], axis=1)
-        both = solve_symmetric3(A, columns)
-        return _Node(both[:, 0], both[:, 1:], robot.com[0] - kinematics(robot, theta).com[0])
+        pose = kinematics(robot, theta)
+        return _Node(*velocity_by_momentum(robot, pose, theta_dot), robot.com[0] - pose.com[0])
 
     nodes = over_nodes(node, *(leaf.reshape(within.size, robot.joints) for leaf in (state.theta, state.theta_dot)))
     count = trajectory.pieces * steps

@@ -15,7 +15,7 @@ from reojax._internal import checks
 from reojax._internal.arrays import Array, is_concrete
 from reojax.mechanics.own_units import without_names
 from reojax.motion._resolution import MOST, TURN, error_by_halving, start_count
-from reojax.motion.release import ORDER, Release, check_release, integrate_release, nodes_of, turn_bounds
+from reojax.motion.release import ORDER, Release, check_release, integrate_release, nodes_of, nodes_of_half, turn_bounds
 from reojax.motion.trajectory import Trajectory
 from reojax.robot import Robot
 
@@ -103,7 +103,7 @@ def _spread(
 ) -> ReleaseSpread:
     steps *= 1 + steps % 2  # the error is found by half the steps
     _, length, nodes = nodes_of(robot, trajectory, steps)
-    double = jax.tree.map(lambda x: jnp.stack([x[::2, 0], x[::2, 2], x[1::2, 2]], axis=1), nodes)
+    double = nodes_of_half(nodes)
 
     def end(release: Array) -> Array:
         return integrate_release(length, nodes, release)[0][-1]
@@ -118,11 +118,13 @@ def _spread(
     ends, slopes = jax.vmap(lambda release, by: jax.jvp(end, (release,), (by,)))(start, along)
     places = np.array([0, *range(mean.size, len(start))])
     error = error_by_halving(jnp.repeat(ends[places], 2, axis=0)[:-1], jax.vmap(rough_end)(start[places]), ORDER)
+    # first order: J, and J diag(deviation^2) J^T
     rotation = ends[0]
     back = partial(jnp.matmul, rotation.T, precision="highest")
     sensitivity = jax.vmap(lambda slope: so3.vee(back(slope)))(slopes[: mean.size]).T
     scaled = sensitivity * deviation[None]
     covariance = jnp.matmul(scaled, scaled.T, precision="highest")
+    # by draws, with nothing linear about it
     drawn = jax.vmap(lambda turned: so3.log(back(turned)))(ends[mean.size :])
     return ReleaseSpread(
         rotation=rotation,

@@ -19,14 +19,15 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
-from reojax._internal.linalg import solve_symmetric3
 from reojax.mechanics.dynamics import Load, base_velocity, joint_load
 from reojax.mechanics.integrators import GAUSS, end_rotation, orientations, step_nodes
-from reojax.mechanics.momentum import momentum_matrices
+from reojax.mechanics.kinematics import kinematics
+from reojax.mechanics.momentum import velocity_by_momentum
 from reojax.mechanics.own_units import without_names
 from reojax.motion._resolution import (
     Resolution,
     error_by_halving,
+    fill_up_half,
     orientations_found,
     over_nodes,
     quietly,
@@ -219,9 +220,7 @@ def orientation_along(
 
     # omega = A^-1 B theta_dot + A^-1 R^T H at every node: its own part, and what multiplies R^T H
     def turning(theta: Array, theta_dot: Array) -> tuple[Array, Array]:
-        A, B = momentum_matrices(robot, theta)
-        both = solve_symmetric3(A, jnp.concatenate([(B @ theta_dot)[:, None], jnp.eye(3, dtype=dtype)], axis=1))
-        return both[:, 0], both[:, 1:]
+        return velocity_by_momentum(robot, kinematics(robot, theta), theta_dot)
 
     flat = jax.tree.map(lambda leaf: leaf.reshape(within.size, robot.joints), state)
     own, mobility = over_nodes(turning, flat.theta, flat.theta_dot)
@@ -229,8 +228,8 @@ def orientation_along(
     step = jnp.repeat(length / count, count)
     own, mobility = own.reshape(steps, -1, 3), mobility.reshape(steps, -1, 3, 3)
     # the same motion by all steps and by half of them, side by side: their distance is the error
-    lengths = jnp.stack([step, _half(2 * step[::2])])
-    both_own, both_mobility = (jnp.stack([x, _half(_coarse(x))]) for x in (own, mobility))
+    lengths = jnp.stack([step, fill_up_half(2 * step[::2])])
+    both_own, both_mobility = (jnp.stack([x, fill_up_half(_coarse(x))]) for x in (own, mobility))
     integrate = jax.vmap(orientations, (0, 0, 0, None))  # one loop, compiled once
     fine, coarse = integrate(lengths, both_own, both_mobility, momentum)
     # bound of the turn in a step, |A^-1 B theta_dot| + |A^-1| |H|
@@ -250,11 +249,6 @@ _COARSE = ((0, 0), (0, 3), (0, 4), (1, 1), (1, 4))
 def _coarse(nodes: Array) -> Array:
     """Nodes of steps of twice the length, (s / 2, 5, ...), out of those of all steps."""
     return jnp.stack([nodes[half::2, node] for half, node in _COARSE], axis=1)
-
-
-def _half(values: Array) -> Array:
-    """Values of half the steps, filled up with steps of no length."""
-    return jnp.concatenate([values, jnp.zeros_like(values)])
 
 
 def _samples(nodes: Array, substeps: int) -> Array:

@@ -91,11 +91,13 @@ def along(path: Path, law: Law | str, durations: ArrayLike) -> Trajectory:
     times = _durations(durations, path)
     dtype = common_float(path.waypoints, times, law)
     points, times, breaks, powers = (jnp.asarray(x, dtype) for x in (path.waypoints, times, *law))
+    # theta = start + turn f(t / T): powers of the law's piece, each by T^-k, times the turn of the edge
     order = jnp.arange(powers.shape[1])
     safe = jnp.where(times > 0, times, 1)
     scale = jax.vmap(lambda duration: duration ** -order.astype(dtype))(safe)
     pieces = jnp.einsum("pk,ek,ej->epkj", powers, scale, jnp.diff(points, axis=0))
     pieces = pieces.at[:, :, 0].add(points[:-1, None])
+    # where the edges begin, and the law's breaks within each
     start = jnp.concatenate([jnp.zeros(1, dtype), jnp.cumsum(times)])
     inner = start[:-1, None] + times[:, None] * breaks[None, :-1]
     return Trajectory(jnp.concatenate([inner.ravel(), start[-1:]]), pieces.reshape(inner.size, *pieces.shape[2:]))
@@ -142,6 +144,7 @@ def overlap_pieces(
     corners, start, length = (jnp.asarray(x, dtype) for x in (corners, start, length))
     law = Law(*(jnp.asarray(x, dtype) for x in law))
     turn = (corners[1:] - corners[:-1])[edge, joint]
+    # pieces end wherever a piece of any move does
     ends = (start[:, None] + length[:, None] * law.breaks[None]).ravel()
     breaks = jnp.sort(jnp.concatenate([jnp.zeros(1, dtype), ends]))
     middle = 0.5 * (breaks[1:] + breaks[:-1])
@@ -154,6 +157,7 @@ def overlap_pieces(
         constant = jnp.zeros_like(powers).at[0].set(jnp.where(u < 0, 0, 1))
         return jnp.where((u < 0) | (u > 1), constant, powers) * (1 / length) ** jnp.arange(powers.shape[0])
 
+    # the sum of all moves' parts, each onto its joint
     over_moves = jax.vmap(part, (None, None, 0, 0))
     parts = jax.vmap(over_moves, (0, 0, None, None))(breaks[:-1], middle, start, length)
     carrier = jnp.asarray(np.eye(corners.shape[1])[joint], dtype) * turn[:, None]

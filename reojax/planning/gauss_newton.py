@@ -46,11 +46,13 @@ def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Iterate:
 
     def body(state):
         i, x, tried, at, strength, before = state
+        # keep what was tried if it is better, and trust the linear model more or less by that
         then = miss(table, word, tried)
         better = then.square < at.square
         before = jnp.stack([at.square, before[0]])
         strength = jnp.clip(jnp.where(better, 0.2 * strength, 6 * strength), 1e-4, 1e6)
         x, at = jnp.where(better[None, None], tried, x), _choose(better, then, at)
+        # damping falls with the residual, so that the last steps are Gauss-Newton's own
         damping = strength * jnp.sqrt(at.square) * (at.jacobian**2).sum((0, 1, 2))
         dx = _inside(x, word, used, lambda free, held: step(at, free, held, damping))
         return i + 1, x, jnp.clip(x + dx, word.low, word.high), at, strength, before
@@ -76,6 +78,7 @@ def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], st
     zero = jnp.zeros_like(x[0, 0])
 
     def direction(at: Miss, free: Array, held: Array, reach: Array) -> Array:
+        # less travel, its part that would leave the target taken out: J^T (J J^T)^-1 J slope - slope
         downhill = jnp.where(free, slope, 0.0)
         force = dual(at.jacobian, free, zero, (at.jacobian * downhill[:, :, None]).sum((0, 1)))
         along = pull(at.jacobian, force, free) - downhill

@@ -53,6 +53,7 @@ def miss(table: Table, word: Word, x: Float[Array, "d k m"]) -> Miss:
 
 def chain(word: Word, q: Float[Array, "4 k m"], dq: Float[Array, "d 4 k m"]) -> Miss:
     """Put the loops' quaternions and their derivatives together."""
+    # of the powers M^n: what stands before each in the product, and what after it
     q, dq = jax.lax.optimization_barrier(_powers(word.runs, q, dq))  # once, not again for every product
     rest = jnp.ones_like(word.target[0]), *jnp.zeros_like(word.target[1:])
 
@@ -64,9 +65,11 @@ def chain(word: Word, q: Float[Array, "4 k m"], dq: Float[Array, "d 4 k m"]) -> 
 
     (w, *v), left = jax.lax.scan(onward, inverse(tuple(word.target)), tuple(q))
     _, right = jax.lax.scan(back, rest, tuple(q), reverse=True)
+    # 2 v of the rotation left, on the side where w > 0
     sign = jnp.where(w < 0, -2.0, 2.0).astype(w.dtype)
     residual = sign[None] * jnp.stack(v)
     left, right = (tuple(component[None] for component in side) for side in (left, right))
+    # d(before M after) = before dM after
     changes = product(product(left, tuple(dq[:, i] for i in range(4))), right)
     jacobian = sign[None, None, None] * jnp.stack(changes[1:], axis=2)
     return Miss(residual, jacobian, (residual * residual).sum(0))
@@ -78,9 +81,11 @@ def _powers(count: Array, q: Array, dq: Array) -> tuple[Array, Array]:
     sine = jnp.sqrt((v * v).sum(0))
     turns = sine > 1e-9
     safe = jnp.where(turns, sine, 1.0)
+    # f, and n f
     half = jnp.arctan2(sine, w)
     c, s = jnp.cos(count * half), jnp.sin(count * half)
     ratio = jnp.where(turns, s / safe, count)
+    # df = w u . dv - |v| dw; then dw' = -n sin(n f) df, dv' = ratio dv + (n cos(n f) df - ratio u . dv) u
     axis = v / safe[None]
     along = (axis[None] * dq[:, 1:]).sum(1)
     change = w[None] * along - sine[None] * dq[:, 0]
@@ -109,6 +114,7 @@ def dual(jacobian: Array, free: Array, damping: Array, right: Array) -> Array:
     """Solve `(J J^T + damping) y = right` with the free columns of J; 3x3, in closed form."""
     masked = jnp.where(free[:, :, None], jacobian, 0.0)
     x, y, z = (masked[:, :, i] for i in range(3))
+    # entries of J J^T + damping, its adjugate and its determinant
     floor = damping + _tiny(x.dtype)
     a, b, c = ((p * p).sum((0, 1)) + floor for p in (x, y, z))
     d, e, f = ((p * r).sum((0, 1)) for p, r in ((x, y), (x, z), (y, z)))

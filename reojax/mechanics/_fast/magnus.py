@@ -91,19 +91,24 @@ def step_rotations(omega: Triple) -> Step:
         omega: angular velocity times the step's duration at the nodes of all steps, three arrays (steps * 8,).
     """
     s = jnp.asarray(np.tile(NODES - 0.5, omega[0].shape[0] // len(NODES)), omega[0].dtype)
+    # 1. Mean: u = exp((s - 1/2) wbar) (omega - wbar)
     mean = _spread(omega, _MEAN_AT_NODES)
     u = materialize(_rotate(scaled(s, mean), plus(omega, scaled(-1, mean))))
+    # 2. Fer: U, the running integral of u, and v = (exp(U) - J(U)) u
     turned = _spread(u, _INTEGRAL)
     v = materialize(_fer(u, turned))
+    # 3. Magnus: m_0 + (m_0 x m_1 + m_1 x m_2 + ...) / 2
     m = _moments(v, _USED)
     first = m[0]
     for a, b in pairwise(m):
         first = plus(first, scaled(0.5, cross(a, b)))
+    # all together: exp(wbar / 2) P(1) exp(U(1)) exp(wbar / 2)
     half = materialize(_exp(scaled(0.5, _moments(omega, 1)[0])))
     inner = materialize(product(_exp_small(first), _exp_small(_moments(u, 1)[0])))
     rotation = materialize(product(product(half, inner), half))
 
     def turns() -> tuple[Triple, ...]:
+        # exp((s - 1/2) wbar), then exp(U), then P to first order
         return scaled(s, mean), turned, _spread(v, _INTEGRAL)
 
     def inside(vectors: Triple) -> Triple:
@@ -112,7 +117,7 @@ def step_rotations(omega: Triple) -> Step:
         return vectors
 
     def back(vectors: Triple) -> Triple:
-        vectors = materialize(_spread(vectors, _SHARES))
+        vectors = materialize(_spread(vectors, _SHARES))  # of a mean over the step
         for turn in reversed(turns()):
             vectors = _rotate(scaled(-1, turn), vectors)
         return materialize(vectors)
@@ -133,6 +138,7 @@ def _rotate(by: Triple, vectors: Triple) -> Triple:
 
 
 def _fer(u: Triple, turned: Triple) -> Triple:
+    """`(exp(U) - J(U)) u`: the power series of both, less each other, in `U x u` and `U x (U x u)`."""
     square = jnp.minimum(dot(turned, turned), _SERIES_END)
     p = cross(turned, u)
     return plus(scaled(horner(_FER_1, square), p), scaled(horner(_FER_2, square), cross(turned, p)))
@@ -146,10 +152,12 @@ def _exp_small(vector: Triple) -> Quaternion:
 
 def _exp(vector: Triple) -> Quaternion:
     """Quaternion of a rotation vector of any length."""
-    square = 0.25 * dot(vector, vector)
+    square = 0.25 * dot(vector, vector)  # of half the angle
     small = square < 1e-4
+    # closed form, its argument safe where it is not read
     angle = jnp.sqrt(jnp.where(small, 1.0, square))
     s, c = sincos(angle)
+    # power series near zero
     near = jnp.where(small, square, 0.0)
     k = 0.5 * jnp.where(small, horner(_SIN1[:4], near), s / angle)
     return jnp.where(small, horner(_COS0[:4], near), c), *scaled(k, vector)

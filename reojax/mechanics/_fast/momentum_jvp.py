@@ -30,16 +30,20 @@ def angular_momentum(
     """
     joints = range(len(robot.parent))
     E = [joint_rotation(e, *sc) for e, sc in zip(robot.axis, sine_cosine, strict=True)]
+    # outward: w' = E^T w + rate e, v' = E^T (v + w x a)
     motion: list[Pair] = [(omega, velocity)]
     for k in joints:
         w, v = outward(E[k], robot.anchor[k], motion[robot.parent[k]])
         motion.append(kept((plus(w, scaled(rate[k], robot.axis[k])), v)))
+    # of each link: p = m v + w x f, h = J w + f x v
     bodies = zip(robot.mass, robot.moment, robot.inertia, motion, strict=True)
     momentum = [body_momentum(m, f, J, *of_link) for m, f, J, of_link in bodies]
+    # inward: p + E p', h + E h' + a x E p', and the rotors
     for k in reversed(joints):
         parent = robot.parent[k]
         rotor = scaled(mul(rate[k], robot.rotor_momentum[k]), robot.axis[k])
         momentum[parent] = onto_parent(E[k], robot.anchor[k], momentum[parent], kept(momentum[k + 1]), rotor)
+    # from the base's origin to the centre
     p, h = momentum[0]
     return plus(h, scaled(-1, cross(centre, p)))
 

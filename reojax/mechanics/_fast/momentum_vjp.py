@@ -62,6 +62,7 @@ def slopes(
     """Differentiate `mu . angular_momentum(...)` (`momentum_jvp`) at fixed `mu`, `omega`, `velocity` and `centre`."""
     joints = range(len(robot.parent))
     E = [joint_rotation(e, *sc) for e, sc in zip(robot.axis, sine_cosine, strict=True)]
+    # outward: both motions of every link, w, v and w~, v~
     actual: list[Pair] = [(omega, velocity)]
     virtual: list[Pair] = [(mu, cross(centre, mu))]
     for k in joints:
@@ -69,9 +70,11 @@ def slopes(
         w, v = outward(E[k], anchor, actual[parent])
         actual.append(kept((plus(w, scaled(rate[k], robot.axis[k])), v)))
         virtual.append(kept(outward(E[k], anchor, virtual[parent])))
+    # momenta of each link alone, in both motions
     bodies = list(zip(robot.mass, robot.moment, robot.inertia, strict=True))
     momentum = [body_momentum(*body, *motion) for body, motion in zip(bodies, actual, strict=True)]
     likewise = [body_momentum(*body, *motion) for body, motion in zip(bodies, virtual, strict=True)]
+    # inward: momenta p, h and p~, h~ of all beyond each joint, and what the joint does
     of_joints: list[Any] = [None] * len(joints)
     for k in reversed(joints):
         link, parent, e = k + 1, robot.parent[k], robot.axis[k]
@@ -112,8 +115,9 @@ def body_slopes(motion: Pair, virtual: Pair) -> BodySlopes:
     (w, v), (w_, v_) = motion, virtual
     mixed = tuple(add(mul(w[i], w_[j]), mul(w[j], w_[i])) for i, j in ((0, 1), (0, 2), (1, 2)))
     return BodySlopes(
-        mass=dot(v, v_),
-        moment=plus(cross(v, w_), cross(v_, w)),
+        mass=dot(v, v_),  # m v~ . v
+        moment=plus(cross(v, w_), cross(v_, w)),  # w~ . (f x v) + v~ . (w x f)
+        # w~ . J w, products counted twice
         inertia=(*(mul(x, y) for x, y in zip(w, w_, strict=True)), *mixed),
     )
 
@@ -145,8 +149,8 @@ def joint_slopes(
     `virtual_before` is the virtual angular velocity of the link before, which carries the joint's rotor.
     """
     (p, h), (p_, h_), (w, v), (w_, v_), (s, c) = momentum, momentum_, motion, virtual, sine_cosine
-    u = plus(w, scaled(mul(-1, rate), e))
-    # a turn of all beyond the joint, about any axis
+    u = plus(w, scaled(mul(-1, rate), e))  # the joint's own rate turns with its axis
+    # a turn of all beyond the joint, about any axis: h~ x u + p~ x v + h x w~ + p x v~
     turning = plus(plus(cross(h_, u), cross(p_, v)), plus(cross(h, w_), cross(p, v_)))
     if not all(isinstance(x, int) for x in e):  # or else only one of the three is needed
         turning = materialize(turning)
@@ -158,7 +162,7 @@ def joint_slopes(
         theta=dot(e, turning),
         rate=add(dot(e, h_), mul(rotor, along)),
         axis=plus(turned, scaled(rate, moved)),
-        anchor=apply(E, plus(cross(p_, u), cross(p, w_))),
+        anchor=apply(E, plus(cross(p_, u), cross(p, w_))),  # E (p~ x u + p x w~)
         rotor_momentum=mul(rate, along),
     )
 

@@ -146,6 +146,7 @@ def _steps_of_path(problem: RotationProblem, numbers: jax.Array, points: jax.Arr
         theta, rate = path_nodes(points, problem.steps)
         base = inward(problem.robot(split(numbers)), [sincos(a) for a in theta], rate)
         like = theta[0]
+    # A omega = -L, thesis eq. 2.14
     return step_rotations(materialize(_at_nodes(solve(base.inertia, scaled(-1, base.momentum)), like)))
 
 
@@ -171,8 +172,10 @@ def _solution(base: Base, like: jax.Array) -> NodeSolution:
     moving = materialize((*base.momentum, *base.drift))
     centre, drift = materialize(base.centre), moving[3:]
     inertia = materialize(base.inertia)
+    # A omega = -L, thesis eq. 2.14; the base's origin moves so that the centre of mass rests
     omega = materialize(_at_nodes(solve(inertia, scaled(-1, moving[:3])), like))
     velocity = materialize(scaled(-1, plus(drift, cross(omega, centre))))
+    # attitude at the middle frame of each step: the product of the steps before, and half of its mean turn
     step = step_rotations(omega)
     to_step = materialize(product(shift(products_up_to(step.rotation), 1), step.half))
     return NodeSolution(inertia, centre, omega, velocity, step, to_step)
@@ -196,6 +199,7 @@ def _push(problem: RotationProblem, numbers: jax.Array, points: jax.Array, *chan
     by_points = next(given) if problem.moved else jnp.zeros_like(points)
     push = _push_rolled if problem.rolled else _push_unrolled
     known, change = push(problem, numbers, points, by_data, by_points)
+    # the integral of R d omega: within each step, then over all steps
     in_step = materialize(mean_over_step(known.step.inside(known.change_of_omega(change))))
     x, y, z = (c.sum() for c in rotate(known.to_step, in_step))
     return [jnp.stack([x, y, z])]
@@ -248,7 +252,7 @@ def _pull(problem: RotationProblem, numbers: jax.Array, points: jax.Array, by_tu
 
 def _virtual_turn(known: NodeSolution, by_turn: jax.Array) -> Triple:
     """`mu = -A^-1 R^T l` at all nodes."""
-    in_step = materialize(rotate(inverse(known.to_step), tuple(split(by_turn))))
+    in_step = materialize(rotate(inverse(known.to_step), tuple(split(by_turn))))  # R^T l, step by step
     return known.change_of_omega(known.step.back(in_step))
 
 
@@ -262,6 +266,7 @@ def _pull_unrolled(
     mu = _virtual_turn(known, by_turn)
     of = slopes(robot, sine_cosine, rate, known.omega, known.velocity, known.centre, mu)
     found = []
+    # by the robot's parameters: sums over nodes, those that read the same values in one loop
     if any(problem.varied):
         by_entry, loops = jax.tree.leaves(of.robot), jax.tree.leaves(fusion_groups(robot))
         unknown = [i for i, varied in enumerate(problem.varied) if varied and problem.known[i] is None]
@@ -272,6 +277,7 @@ def _pull_unrolled(
             sums |= zip(places, sum_over_nodes(values), strict=True)
         zero = jnp.zeros((), like.dtype)
         found.append(jnp.stack([sums.get(i, zero) for i, varied in enumerate(problem.varied) if varied]))
+    # by the path: from the nodes back to its corners
     if problem.moved:
         by_nodes = [materialize(_at_nodes(of_joint, like)) for of_joint in zip(of.theta, of.rate, strict=True)]
         by_theta, by_rate = ([pair[i] for pair in by_nodes] for i in (0, 1))

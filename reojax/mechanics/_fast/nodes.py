@@ -32,12 +32,14 @@ def per_step(values: jax.Array, matrix: np.ndarray) -> jax.Array:
 
 def path_nodes(points: jax.Array, steps: int) -> tuple[list[jax.Array], list[jax.Array]]:
     """Joint angles and their rates per step at all nodes of the polygon `points` (v, j), joint by joint."""
+    # change of the angles in a step, and the angles where each step begins
     rate = (points[1:] - points[:-1])[:, None, :] / steps
     start = points[:-1, None, :] + rate * jnp.arange(steps, dtype=points.dtype)[None, :, None]
     rate = jnp.broadcast_to(rate, start.shape)
     theta, theta_dot = [], []
     for k in range(points.shape[1]):
         a, b = (x[:, None] for x in materialize((start[..., k].reshape(-1), rate[..., k].reshape(-1))))
+        # theta at the nodes; the rate is that of the edge
         along = a + b * jnp.asarray(NODES[None, :], points.dtype)
         both = materialize((along.reshape(-1), jnp.broadcast_to(b, along.shape).reshape(-1)))
         theta.append(both[0])
@@ -47,6 +49,7 @@ def path_nodes(points: jax.Array, steps: int) -> tuple[list[jax.Array], list[jax
 
 def to_points(theta: list[jax.Array], rate: list[jax.Array], steps: int) -> jax.Array:
     """Transpose of `path_nodes`: from cotangents of all angles and rates to that of the points (v, j)."""
+    # share of its edge at which each node lies: what the edge's two ends are worth there
     along = ((np.arange(steps)[:, None] + NODES) / steps).reshape(-1, 1)
     ends_of_theta = np.hstack([1 - along, along])
     ends_of_rate = np.tile([[-1 / steps, 1 / steps]], (len(along), 1))

@@ -96,10 +96,10 @@ def hand_on(link: Subtree, E: Matrix, e: Vector, anchor: Vector, rate: Scalar, r
     own_rotor = scaled(mul(rate, rotor), e)
     return Subtree(
         mass=link.mass,
-        moment=plus(moment, scaled(link.mass, anchor)),
-        inertia=plus(turned_inertia(E, link.inertia), _shift(link.mass, moment, anchor)),
-        push=push,
-        spin=plus(plus(spin, own_rotor), cross(anchor, push)),
+        moment=plus(moment, scaled(link.mass, anchor)),  # E f + m a
+        inertia=plus(turned_inertia(E, link.inertia), _shift(link.mass, moment, anchor)),  # E J E^T, moved by a
+        push=push,  # E (p + rate e x f)
+        spin=plus(plus(spin, own_rotor), cross(anchor, push)),  # E (h + rate J e) + rotor + a x p'
     )
 
 
@@ -116,10 +116,11 @@ def keep(link: Subtree) -> Subtree:
 
 def about_centre(whole: Subtree) -> Base:
     """Inertia and momentum of the whole robot about its centre of mass, of what hangs on its base."""
+    # c = f / m, and what it moves at
     centre, drift = (scaled(1 / whole.mass, vector) for vector in (whole.moment, whole.push))
     return Base(
-        inertia=plus(whole.inertia, scaled(-1, point_inertia(whole.mass, centre))),
-        momentum=plus(whole.spin, scaled(-1, cross(centre, whole.push))),
+        inertia=plus(whole.inertia, scaled(-1, point_inertia(whole.mass, centre))),  # J - m (|c|^2 - c c^T)
+        momentum=plus(whole.spin, scaled(-1, cross(centre, whole.push))),  # h - c x p
         centre=centre,
         drift=drift,
     )
@@ -144,12 +145,14 @@ def joint_rotation(e: Vector, s: Scalar, c: Scalar) -> Matrix:
         even, odd = mul(versine, mul(a, b)), mul(s, other)
         return sub(even, odd), add(even, odd)
 
+    # c + (1 - c) e e^T + s hat(e)
     (xy, yx), (zx, xz), (yz, zy) = pair(x, y, z), pair(z, x, y), pair(y, z, x)
     return ((diagonal(x), xy, xz), (yx, diagonal(y), yz), (zx, zy, diagonal(z)))
 
 
 def _shift(mass: Scalar, moment: Vector, a: Vector) -> Symmetric:
     """What moving by `a` adds to the inertia of a body of `mass` and first `moment`."""
+    # 2 (a . g) - (a g^T + g a^T) with g = E f + m a / 2
     g = plus(moment, scaled(mul(0.5, mass), a))
     x, y, z = (mul(p, q) for p, q in zip(a, g, strict=True))
     products = tuple(add(mul(a[i], g[j]), mul(a[j], g[i])) for i, j in ((0, 1), (0, 2), (1, 2)))
@@ -172,4 +175,5 @@ def _adjugate(A: Symmetric) -> tuple[Symmetric, Scalar]:
         sub(mul(xy, yz), mul(xz, yy)),
         sub(mul(xy, xz), mul(xx, yz)),
     )
+    # the determinant, by the first row
     return adjugate, dot((xx, xy, xz), (adjugate[0], adjugate[3], adjugate[4]))

@@ -72,6 +72,7 @@ def to_points(theta: jax.Array, rate: jax.Array, steps: int) -> jax.Array:
 
 def inward(robot: Parameters, parent: tuple[int, ...], motion: Motion) -> Base:
     """`recursion.inward`."""
+    # push, spin, moment, inertia of each link alone: one array (links, nodes) for each component
     nodes = motion.rate.shape[1]
     zeros = (jnp.zeros((len(parent) + 1, nodes), motion.rate.dtype),) * 6
     of_links = (*zeros, *_columns(robot.moment, nodes), *_columns(robot.inertia, nodes))
@@ -96,6 +97,7 @@ def angular_momentum(
     robot: Parameters, parent: tuple[int, ...], motion: Motion, omega: Vector, velocity: Vector, centre: Vector
 ) -> Vector:
     """`momentum_jvp.angular_momentum`."""
+    # outward, then each link alone, then inward
     motions = _outward(robot, parent, motion, (*omega, *velocity), moving=True)
     momenta = _momenta_of_bodies(robot, motions)
 
@@ -122,6 +124,7 @@ def slopes(
     mu: Vector,
 ) -> RolledSlopes:
     """`momentum_vjp.slopes`, sums over nodes included."""
+    # both motions outward, and both momenta of each link alone
     actual = _outward(robot, parent, motion, (*omega, *velocity), moving=True)
     virtual = _outward(robot, parent, motion, (*mu, *cross(centre, mu)), moving=False)
     momenta = _momenta_of_bodies(robot, actual)
@@ -134,6 +137,7 @@ def slopes(
         E = joint_rotation(e, s, c)
         w_before = _read(virtual, before)[:3]
         found = joint_slopes(E, e, (s, c), rate, rotor, momentum, momentum_, motion_, virtual_, w_before)
+        # both momenta onto the link before
         nothing = (0, 0, 0)
         handed = onto_parent(E, a, (nothing, nothing), momentum, scaled(rate * rotor, e))
         handed_ = onto_parent(E, a, (nothing, nothing), momentum_, nothing)
@@ -141,6 +145,7 @@ def slopes(
             _add(columns[0], before, materialize((*handed[0], *handed[1]))),
             _add(columns[1], before, materialize((*handed_[0], *handed_[1]))),
         )
+        # by the path at every node, by the robot summed over nodes
         theta, rate_ = materialize((found.theta, found.rate))
         sums = sum_over_nodes(list(found.axis)), sum_over_nodes([*found.anchor, found.rotor_momentum])
         return columns, (theta, rate_, *(jnp.stack(of) for of in sums))

@@ -52,10 +52,12 @@ def horner(coefficients: tuple[float, ...], x: Any) -> Any:
 def sincos(angle: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Return sine and cosine of `angle` [rad]; float32 or float64, any shape."""
     size = angle.dtype.itemsize
+    # angle = quarter pi / 2 + r
     quarter = lax.round(mul(angle, 0.6366197723675814), lax.RoundingMethod.TO_NEAREST_EVEN)
     r = angle
     for part in _HALF_PI[size]:
         r = sub(r, mul(quarter, part))
+    # r + r^3 P(r^2), and 1 - r^2 / 2 + r^4 Q(r^2)
     z = mul(r, r)
     sine = add(r, mul(mul(r, z), horner(_SIN[size], z)))
     cosine = add(sub(1, mul(0.5, z)), mul(mul(z, z), horner(_COS[size], z)))
@@ -64,6 +66,7 @@ def sincos(angle: jax.Array) -> tuple[jax.Array, jax.Array]:
     swap = lax.ne(half, whole)
     quarter_turns = mul(0.5, whole)
     minus = lax.ne(quarter_turns, lax.floor(quarter_turns))
+    # odd quadrants swap sine and cosine; the third and fourth change their sign
     s = lax.select(swap, cosine, sine)
     c = lax.select(swap, lax.neg(sine), cosine)
     return lax.select(minus, lax.neg(s), s), lax.select(minus, lax.neg(c), c)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from reojax import so3
@@ -25,13 +26,17 @@ def magnus4(first: Float[Array, "*s 3"], second: Float[Array, "*s 3"]) -> Array:
 
 
 def magnus6(first: Float[Array, "*s 3"], middle: Float[Array, "*s 3"], last: Float[Array, "*s 3"]) -> Array:
-    """Rotation vector of a step, to sixth order; angular velocities at `GAUSS` times the step's duration."""
+    """Rotation vector of a step, to sixth order; angular velocities at `GAUSS` times the step's duration.
+
+    Of NumPy arrays on the host, of others by JAX.
+    """
+    cross = np.cross if isinstance(first, np.ndarray) else jnp.cross
     # the first three moments of omega about the middle of the step
     a1, a2, a3 = middle, 15**0.5 / 3 * (last - first), 10 / 3 * (last - 2 * middle + first)
     # single and double commutators
-    c1 = jnp.cross(a2, a1)
-    c2 = -jnp.cross(2 * a3 + c1, a1) / 60
-    return a1 + a3 / 12 + jnp.cross(a2 + c2, -20 * a1 - a3 + c1) / 240
+    c1 = cross(a2, a1)
+    c2 = -cross(2 * a3 + c1, a1) / 60
+    return a1 + a3 / 12 + cross(a2 + c2, -20 * a1 - a3 + c1) / 240
 
 
 def end_rotation(length: Float[Array, " s"], omega: Float[Array, "s 3 3"]) -> Float[Array, "3 3"]:
@@ -43,6 +48,7 @@ def end_rotation(length: Float[Array, " s"], omega: Float[Array, "s 3 3"]) -> Fl
         length: (s,) durations of the steps [s].
         omega: (s, 3, 3) angular velocity at the nodes `GAUSS` of each step, one in each row [rad/s].
     """
+    # rotation of every step, then products of pairs, of pairs of pairs, and so on
     turn = jax.vmap(so3.exp)(magnus6(*(length[:, None] * omega[:, i] for i in range(3))))
     while turn.shape[0] > 1:
         if turn.shape[0] % 2:
