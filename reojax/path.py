@@ -87,6 +87,10 @@ def _check_limits(points: Array, robot: Limited) -> None:
 
 
 def joint_travel(path: Path) -> Float[Array, ""]:
-    """Sum over all joints of the angle each one moves through along the path [rad]."""
+    """Sum over all joints of the angle each one moves through along the path [rad].
+
+    Raises:
+        ValueError: if `path` is no Path.
+    """
     instance("path", path, Path, "`polygon(waypoints)` makes")
     return abs(path.waypoints[1:] - path.waypoints[:-1]).sum()

@@ -23,6 +23,11 @@ _MOST = 1e100
 def with_mass(robot: Robot, link: int | str, mass: ArrayLike) -> Robot:
     """Another mass [kg] of the same shape: the link's inertia is scaled with it.
 
+    Args:
+        robot: the robot.
+        link: name or number of the link.
+        mass: its mass [kg]; may be traced.
+
     Raises:
         ValueError: if there is no such link, or `mass` is not one positive number.
     """
@@ -36,8 +41,13 @@ def with_mass(robot: Robot, link: int | str, mass: ArrayLike) -> Robot:
 def with_com_offset(robot: Robot, link: int | str, offset: ArrayLike) -> Robot:
     """Centre of mass moved by `offset` (3,) [m] in the link's frame, the inertia about it as before.
 
+    Args:
+        robot: the robot.
+        link: name or number of the link.
+        offset: (3,) what is added to its `com`, link frame [m]; may be traced.
+
     Raises:
-        ValueError: if there is no such link, or `offset` is not of shape (3,).
+        ValueError: if there is no such link, or `offset` is not of shape (3,) or not finite.
     """
     index, move = _number(robot, "link", link), as_numbers("offset", offset)
     if move.shape != (3,):

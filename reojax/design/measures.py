@@ -86,7 +86,11 @@ def off_axis_within(axis: ArrayLike, angle: float) -> Measure:
 
 
 def travel(loop: Loops | None = None) -> Measure:
-    """Joint travel [rad]: of a family of loops, smooth in its coefficients; or of any path, with kinks at rest."""
+    """Joint travel [rad]: of a family of loops, smooth in its coefficients; or of any path, with kinks at rest.
+
+    Args:
+        loop: the family whose coefficients are variables of the problem; None for the outcome's path.
+    """
     if loop is None:
         return lambda outcome: joint_travel(outcome.path)
     return lambda outcome: loop.travel(outcome.values[loop.variable.name])
@@ -95,7 +99,10 @@ def travel(loop: Loops | None = None) -> Measure:
 def loop_area(outcome: Outcome) -> Array:
     """Area of the loop in shape space [rad^2]: size of the vector of its projections onto the planes of two joints.
 
-    With two joints it is the enclosed area, with sign left out.
+    With two joints it is the enclosed area, with sign left out. It is a measure itself: `objective=loop_area`.
+
+    Args:
+        outcome: of the design; its path is read.
     """
     points = jnp.asarray(outcome.path.waypoints)
     middle, step = 0.5 * (points[1:] + points[:-1]), points[1:] - points[:-1]
@@ -126,6 +133,13 @@ def bend_within(joint: int | str, name: str) -> Measure:
     """Whether the joint's angle stays within plus and minus the variable `name` [rad], for an inequality.
 
     Least peak bend is smooth this way: let `name` be a variable, and make it the objective.
+
+    Args:
+        joint: name or number of the joint.
+        name: of the variable, in SI [rad].
+
+    Raises:
+        ValueError: when the measure is taken, if there is no such joint or variable.
     """
 
     def measure(outcome: Outcome) -> Array:
@@ -137,7 +151,11 @@ def bend_within(joint: int | str, name: str) -> Measure:
 
 
 def value_of(name: str) -> Measure:
-    """The variable `name` itself, in SI."""
+    """The variable `name` itself, in SI.
+
+    Raises:
+        ValueError: when the measure is taken, if there is no such variable.
+    """
     return lambda outcome: _value(outcome, name)
 
 

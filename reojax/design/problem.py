@@ -123,21 +123,29 @@ class Problem:
         return Functions(self.cost, self._equality, self._inequality, False)
 
     def equality(self, x: Array) -> Float[Array, " p"]:
-        """What must be 0 at a design (n,) in SI: the measures, then the conditions of the loops."""
+        """What must be 0 at a design `x` (n,) in SI: the measures, then the conditions of the loops."""
         return jnp.concatenate([function(x) for function in self._equality])
 
     def inequality(self, x: Array) -> Float[Array, " q"]:
-        """What must not be positive."""
+        """What must not be positive at a design `x` (n,) in SI, in the same order."""
         return jnp.concatenate([function(x) for function in self._inequality])
 
     def outcome(self, x: Array) -> Outcome:
-        """Outcome of a design as a vector (n,) in SI."""
+        """Outcome of a design `x`, a vector (n,) in SI, in the order of `space.names`; may be traced."""
         values = self.space.named(x)
         robot, path = self._build(values)
         return Outcome(values, robot, path, self._steps)
 
     def starts(self, count: int, *, seed: int = 0) -> Float[np.ndarray, "m n"]:
-        """Random designs within the bounds, loops within the joint limits."""
+        """Random designs (m, n) in SI, within the bounds, loops within the joint limits.
+
+        Args:
+            count: how many.
+            seed: of the random numbers.
+
+        Raises:
+            ValueError: if `count` is no positive integer, or `seed` no whole number.
+        """
         count, rng = checks.whole("count", count), np.random.default_rng(checks.seed(seed))
         x = rng.uniform(self.space.lower, self.space.upper, (count, len(self.space.lower)))
         for loop in self.loops:

@@ -183,6 +183,18 @@ def scatter(robot: Robot, path: Path, tolerances: Mapping[str, ArrayLike], *, st
     The trace of `Spread.covariance`, with derivatives by the errors as central differences over a hundredth of their
     standard deviations, so that its own gradient needs first derivatives only. Right to 1e-8 relative or so in float64;
     in float32 it warns, as a tenth may be lost.
+
+    Args:
+        robot: the robot, with the numbers of the drawing.
+        path: the path in shape space.
+        tolerances: standard deviations by field, as for `spread`.
+        steps: steps per edge, static.
+
+    Raises:
+        ValueError: as `spread`.
+
+    Warns:
+        UserWarning: in single precision.
     """
     check_path(check_robot(robot), path)
     warn_if_single("differences of a hundredth of a tolerance are not resolved", common_float(robot, path))

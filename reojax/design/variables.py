@@ -75,14 +75,14 @@ class Space:
         return self._places[self.names.index(name)]
 
     def named(self, x: Array) -> dict[str, Array]:
-        """Values in SI by name, of a vector (n,) or several (m, n); may be traced."""
+        """Values in SI by name, of a vector `x` (n,) or several (m, n); may be traced."""
         return {
             name: x[..., place].reshape(x.shape[:-1] + shape)
             for name, place, shape in zip(self.names, self._places, self._shapes, strict=True)
         }
 
     def vector(self, values: Mapping[str, ArrayLike]) -> Float[np.ndarray, " n"]:
-        """Vector of a design given by name, in the variables' own units.
+        """Vector (n,) in SI of a design whose `values` are given by name, in the variables' own units.
 
         Raises:
             ValueError: for unknown or missing names, or a wrong shape.

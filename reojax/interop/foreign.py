@@ -35,7 +35,7 @@ class Foreign(NamedTuple):
 
 
 def rotors(robot: Robot) -> Iterator[Rotor]:
-    """The rotors that have any inertia."""
+    """The rotors of a robot that have any inertia."""
     for k, (parent, side) in enumerate(zip(robot.parent, robot.rotor_on, strict=True)):
         if robot.rotor_inertia[k] > 0:
             on_parent = side == "parent"
@@ -69,6 +69,11 @@ def configuration(foreign: Foreign, base: list, theta: np.ndarray, neutral: np.n
 
 
 def split(momentum: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`A`, `B` and the effect of the base's linear velocity (all in the base frame) of a momentum matrix."""
+    """`A` (3, 3), `B` (3, j) and the effect of the base's linear velocity (3, 3), all in the base frame [kg m^2, kg m].
+
+    Args:
+        momentum: (3 or 6, 6 + j) momentum per base velocity and joint rates, inertial frame, the angular one last.
+        rotation: (3, 3) of the base, base components to inertial ones.
+    """
     momentum = rotation.T @ momentum[-3:]
     return momentum[:, 3:6], -momentum[:, 6:], momentum[:, :3]

@@ -16,6 +16,9 @@ def mujoco_model(robot: Robot) -> Foreign:
     MuJoCo wants positive masses that obey the triangle rule, so each rotor is a small flat disc near its
     link's centre of mass: a thousandth of the link's mass, transverse inertia 0.6 of the axial. The
     link loses exactly what the disc has.
+
+    Raises:
+        ImportError: without MuJoCo.
     """
     import mujoco
 
@@ -50,7 +53,14 @@ def mujoco_model(robot: Robot) -> Foreign:
 
 
 def mujoco_momentum(foreign: Foreign, theta: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """Angular momentum matrix by MuJoCo: (3, 6 + j), see `split`."""
+    """Angular momentum matrix by MuJoCo: (3, 6 + j), see `split`.
+
+    Args:
+        foreign: what `mujoco_model` gives.
+        theta: (j,) joint angles [rad].
+        position: (3,) of the base, inertial frame [m].
+        rotation: (3, 3) of the base, base components to inertial ones.
+    """
     import mujoco
 
     data = mujoco.MjData(foreign.model)

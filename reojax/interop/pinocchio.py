@@ -9,7 +9,11 @@ from reojax.robot import Robot
 
 
 def pinocchio_model(robot: Robot) -> Foreign:
-    """The robot in Pinocchio; rotors are bodies without mass, with inertia about their axes only."""
+    """The robot in Pinocchio; rotors are bodies without mass, with inertia about their axes only.
+
+    Raises:
+        ImportError: without Pinocchio.
+    """
     import pinocchio as pin
 
     model = pin.Model()
@@ -36,7 +40,14 @@ def pinocchio_model(robot: Robot) -> Foreign:
 
 
 def pinocchio_momentum(foreign: Foreign, theta: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """Momentum matrix by Pinocchio: (6, 6 + j), see `split`."""
+    """Momentum matrix by Pinocchio: (6, 6 + j), see `split`.
+
+    Args:
+        foreign: what `pinocchio_model` gives.
+        theta: (j,) joint angles [rad].
+        position: (3,) of the base, inertial frame [m].
+        rotation: (3, 3) of the base, base components to inertial ones.
+    """
     import pinocchio as pin
 
     data = foreign.model.createData()

@@ -149,6 +149,10 @@ def joint_inertia(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "j j"
 
     Symmetric, positive definite; `1/2 theta_dot . M theta_dot` is the kinetic energy at zero momentum.
 
+    Args:
+        robot: the robot.
+        theta: (j,) joint angles [rad].
+
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """

@@ -47,6 +47,10 @@ def link_poses(robot: Robot, theta: Float[Array, " j"]) -> LinkPoses:
     `rotation` (n, 3, 3) takes link components to base components, `position` (n, 3) is the frame's origin [m]; link 0,
     the base, has the identity and zero.
 
+    Args:
+        robot: the robot.
+        theta: (j,) joint angles [rad].
+
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """
@@ -55,6 +59,10 @@ def link_poses(robot: Robot, theta: Float[Array, " j"]) -> LinkPoses:
 
 def centre_of_mass(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "3"]:
     """Centre of mass of the whole robot, base frame, from the base frame's origin [m].
+
+    Args:
+        robot: the robot.
+        theta: (j,) joint angles [rad].
 
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.

@@ -88,6 +88,10 @@ def connection(robot: Robot, theta: Float[Array, " j"]) -> Float[Array, "3 j"]:
 
     `omega = connection(robot, theta) @ theta_dot` at zero angular momentum (thesis 2.5).
 
+    Args:
+        robot: the robot.
+        theta: (j,) joint angles [rad].
+
     Raises:
         ValueError: if `theta` has the wrong shape or is not finite.
     """

@@ -93,13 +93,23 @@ class Drive(NamedTuple):
 
 
 def stall_torque(motor: Motor) -> float | Array:
-    """Torque at standstill under the full supply, `k supply / resistance` [N m]."""
+    """Torque at standstill under the full supply, `k supply / resistance` [N m].
+
+    Args:
+        motor: one motor, or many in fields of one shape, which the result has.
+
+    Raises:
+        ValueError: if `motor` is none, or has a number that no motor has.
+    """
     motor = _motor(motor)
     return motor.torque_constant * motor.supply / motor.resistance
 
 
 def no_load_speed(motor: Motor) -> float | Array:
-    """Speed without a load under the full supply, own drag and friction included [rad/s]."""
+    """Speed without a load under the full supply, own drag and friction included [rad/s].
+
+    Arguments and errors as for `stall_torque`.
+    """
     motor = _motor(motor)
     # supply = resistance (drag w + friction) / k + k w
     k, resistance = motor.torque_constant, motor.resistance

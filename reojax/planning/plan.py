@@ -109,7 +109,25 @@ def plan_many(
 ) -> Plan:
     """Plan for many targets (m, 3, 3): `plan` with a leading axis m on every field of the answer.
 
-    Runs on the host in batches; with `progress`, a bar on stderr counts the targets.
+    Runs on the host in batches; with `progress`, a bar on stderr counts the targets. Arguments and errors as for
+    `plan`, but for:
+
+    Args:
+        robot: the robot.
+        targets: (m, 3, 3) rotations of the base, final base components to initial ones.
+        twist_limit: as for `plan` [rad], and so are all that follow.
+        bend_limit: [rad].
+        max_manoeuvres: how many manoeuvres each plan may have.
+        objective: "count" or "travel".
+        vocabulary: "manoeuvres" or "rectangles".
+        layout: which joints twist, bend and fold.
+        clearance: proven along every path [m].
+        tolerance: angle to the target that counts as reached [rad].
+        progress: whether to show a bar on stderr, or what to write before it.
+        momentum: none, or zero.
+
+    Raises:
+        ValueError: naming the entry, if a target is no rotation or an option makes no sense.
     """
     checks.no_momentum(momentum, "plan_many")
     targets = checks.rotations("targets", targets, (-1, 3, 3))
@@ -217,6 +235,9 @@ def replan(
 
     Returns:
         The plan for the rotation left, `measured^T target`; its rotation and error are those of that rotation.
+
+    Raises:
+        ValueError: as `plan`.
     """
     wanted = checks.rotations("target", target, (3, 3))
     now = checks.rotations("measured", measured, (3, 3))

@@ -149,7 +149,7 @@ def _certificate(robot: Robot, waypoints: np.ndarray) -> dict[str, float] | None
 
 
 def load_plan(path: str | os.PathLike[str]) -> SavedPlan:
-    """Read a plan that `save_plan` or `reojax plan --save` wrote.
+    """Read a plan that `save_plan` or `reojax plan --save` wrote to the file `path`.
 
     Raises:
         ValueError: naming the file and the entry that is missing, wrong, or contradicts another.

@@ -16,7 +16,9 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from reojax._internal import checks
 from reojax._internal.arrays import as_numbers
 from reojax.captures.comparison import Comparison
+from reojax.collision.nearest import Nearest
 from reojax.drawing.view import View
+from reojax.motion.closed_loop import Tracking
 from reojax.motion.motor import Motor
 from reojax.motion.simulation import Motion
 from reojax.path import Path
@@ -29,6 +31,8 @@ _KINDS: dict[str, tuple[type, str]] = {
     "Path": (Path, "`polygon(waypoints)` makes"),
     "Motion": (Motion, "`simulate` makes"),
     "Comparison": (Comparison, "`compare` makes"),
+    "Tracking": (Tracking, "`track` makes"),
+    "Nearest": (Nearest, "`nearest_parts` makes"),
     "Motor": (Motor, "`RE_MAX_17`"),
     "View": (View, "`plot.View()`"),
     "Axes": (Axes, "`figure.add_subplot()` makes"),

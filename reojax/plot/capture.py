@@ -24,6 +24,9 @@ def comparison_figure(robot: Robot, comparison: Comparison, *, title: str | None
         robot: the robot.
         comparison: what `compare` returns.
         title: first line of the title; default the robot's name.
+
+    Raises:
+        ValueError: if an argument is not what it must be.
     """
     figure = Figure(figsize=(7.2, 8.6), layout="constrained", facecolor="white")
     zxz, roll, joints = figure.subplots(3, 1, sharex=True, height_ratios=(1.15, 1, 1))

@@ -20,6 +20,7 @@ from reojax.robot import Robot
 _DASHED = (4, 2)
 
 
+@asked
 def tracking_figure(
     robot: Robot, tracking: Tracking, planned: Float[Array, "m 3 3"], *, title: str | None = None
 ) -> Figure:
@@ -30,6 +31,9 @@ def tracking_figure(
         tracking: what `track` returns.
         planned: (m, 3, 3) orientation that the planned motion has at the same times.
         title: first line of the title; default the robot's name.
+
+    Raises:
+        ValueError: if an argument is not what it must be.
     """
     figure = Figure(figsize=(7.2, 8.2), layout="constrained", facecolor="white")
     joints, base, torque = figure.subplots(3, 1, sharex=True, height_ratios=(1, 1, 0.9))
@@ -66,8 +70,8 @@ def bandwidth_figure(bandwidth: ArrayLike, lag: dict[str, np.ndarray], chosen: d
     """Draw RMS errors of the joints against the controllers' bandwidth, and the ones that were chosen.
 
     Args:
-        bandwidth: [rad/s].
-        lag: for each controller, RMS errors [rad].
+        bandwidth: (m,) the bandwidths that were tried [rad/s].
+        lag: for each controller, (m,) RMS errors [rad].
         chosen: for each controller, the tuned bandwidth [rad/s].
     """
     along = checks.numbers("bandwidth", bandwidth, (-1,))

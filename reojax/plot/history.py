@@ -69,6 +69,11 @@ def draw_orientation(
 def draw_joints(axes: Axes, robot: Robot, path: Path) -> Axes:
     """Draw the joint angles of a robot along a path, in degrees; x counts the path's edges.
 
+    Args:
+        axes: flat axes.
+        robot: the robot, whose joints are named.
+        path: the path in shape space.
+
     Raises:
         ValueError: if the path does not fit the robot.
     """

@@ -92,6 +92,9 @@ def motion_figure(robot: Robot, motion: Motion, *, title: str | None = None) -> 
         robot: the robot.
         motion: what `simulate` gives.
         title: first line of the title; default the robot's name.
+
+    Raises:
+        ValueError: if an argument is not what it must be.
     """
     figure = Figure(figsize=(7.2, 9.2), layout="constrained", facecolor="white")
     base, *joints = figure.subplots(4, 1, sharex=True)

@@ -127,7 +127,17 @@ def draw_robot_flat(
 
 @asked
 def draw_axes(axes: Axes3D, length: float, *, at: ArrayLike = (0.0, 0.0, 0.0), names: Sequence[str] = "xyz") -> Axes3D:
-    """Draw the directions x, y and z as lines of `length` [m] with their names at the ends."""
+    """Draw the directions x, y and z as lines of `length` [m] with their names at the ends.
+
+    Args:
+        axes: 3-D axes.
+        length: of the lines [m].
+        at: (3,) where they begin [m].
+        names: three, of x, y and z.
+
+    Raises:
+        ValueError: if an argument is not what it must be.
+    """
     corner = _vector("at", at, 3)
     ends = corner + length * np.eye(3)
     axes.add_collection3d(Line3DCollection([(corner, end) for end in ends], colors=INK, linewidths=1.0))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from reojax._internal.checks import did_you_mean, shorten
+from reojax._internal import checks
 from reojax.robot import Robot
 from reojax.robots.astronaut import astronaut as astronaut
 from reojax.robots.edits import (
@@ -44,5 +44,7 @@ def by_name(name: str) -> Robot:
     """
     if not isinstance(name, str) or name not in _BUILDERS:
         known = ", ".join(NAMES)
-        raise ValueError(f"there is no robot named {shorten(name)}; the names are {known}.{did_you_mean(name, NAMES)}")
+        raise ValueError(
+            f"there is no robot named {checks.shorten(name)}; the names are {known}.{checks.did_you_mean(name, NAMES)}"
+        )
     return _BUILDERS[name]()

@@ -64,8 +64,11 @@ def zipped(axes: Mapping[str, ArrayLike] | None = None, /, **more: ArrayLike) ->
     """List of designs for `sweep`: design `i` has entry `i` of every array.
 
     Args:
-        axes: arrays of one length, by name.
+        axes: arrays (m, ...) of one length m, by name.
         more: further ones, `zipped(twist=..., bend=...)`.
+
+    Raises:
+        ValueError: if the arrays are not of one length, or there is none.
     """
     if axes is not None and not isinstance(axes, Mapping):
         raise ValueError(f"`axes` is {shorten(axes)}; it must map names to the values of each axis.")

@@ -84,7 +84,7 @@ class Sweep:
         ]
 
     def design(self, number: int) -> dict[str, float]:
-        """Values of one design, by its number through the flattened grid."""
+        """Values of one design, by its `number` through the flattened grid, the last axis running fastest."""
         return self._designs.design(number)
 
     def arrays(self) -> dict[str, np.ndarray]:
