@@ -34,7 +34,7 @@ def hat(vector: ArrayLike) -> Float[Array, "3 3"]:
     Raises:
         ValueError: if `vector` is not of shape (3,).
     """
-    return rotations.cross_matrix(_floats(vector, "vector", (3,)))
+    return rotations.hat(_floats(vector, "vector", (3,)))
 
 
 def vee(matrix: ArrayLike) -> Float[Array, "3"]:
@@ -121,8 +121,8 @@ def left_jacobian(vector: ArrayLike) -> Float[Array, "3 3"]:
     square = jnp.sum(v * v)
     return (
         jnp.eye(3, dtype=v.dtype)
-        + rotations.stumpff(2, square) * rotations.cross_matrix(v)
-        + rotations.stumpff(3, square) * rotations.cross_matrix_squared(v)
+        + rotations.stumpff(2, square) * rotations.hat(v)
+        + rotations.stumpff(3, square) * rotations.hat_squared(v)
     )
 
 

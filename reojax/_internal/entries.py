@@ -35,37 +35,37 @@ class _Place:
 
     def set(self, values: Any) -> Any:
         """The values there, replaced."""
-        return self._changed("set", values, lambda _, new: new)
+        return self._change("set", values, lambda _, new: new)
 
     def add(self, values: Any) -> Any:
         """The values there, increased."""
-        return self._changed("add", values, np.add)
+        return self._change("add", values, np.add)
 
     def subtract(self, values: Any) -> Any:
         """The values there, decreased."""
-        return self._changed("subtract", values, np.subtract)
+        return self._change("subtract", values, np.subtract)
 
     def multiply(self, values: Any) -> Any:
         """The values there, times `values`."""
-        return self._changed("multiply", values, np.multiply)
+        return self._change("multiply", values, np.multiply)
 
     mul = multiply
 
     def divide(self, values: Any) -> Any:
         """The values there, over `values`."""
-        return self._changed("divide", values, np.divide)
+        return self._change("divide", values, np.divide)
 
     def power(self, values: Any) -> Any:
         """The values there, to the power of `values`."""
-        return self._changed("power", values, np.power)
+        return self._change("power", values, np.power)
 
     def min(self, values: Any) -> Any:
         """The lesser of the values there and `values`."""
-        return self._changed("min", values, np.minimum)
+        return self._change("min", values, np.minimum)
 
     def max(self, values: Any) -> Any:
         """The larger of the values there and `values`."""
-        return self._changed("max", values, np.maximum)
+        return self._change("max", values, np.maximum)
 
     def apply(self, function: Callable[[Any], Any]) -> Any:
         """The values there, taken through a function."""
@@ -78,7 +78,7 @@ class _Place:
     def _on_device(self, *values: Any) -> bool:
         return any(isinstance(leaf, jax.Array) for leaf in jax.tree.leaves((self._index, *values)))
 
-    def _changed(self, name: str, values: Any, change: Callable[[Any, Any], Any]) -> Any:
+    def _change(self, name: str, values: Any, change: Callable[[Any, Any], Any]) -> Any:
         if self._on_device(values):
             return getattr(jnp.asarray(self._array).at[self._index], name)(values)
         copy = np.array(self._array, copy=True).view(Entries)

@@ -34,7 +34,7 @@ def check_ending(path: str | os.PathLike[str], kind: str, formats: Sequence[str]
     """
     if _path("write", path).suffix[1:].lower() not in formats:
         endings = ", ".join(f".{ending}" for ending in formats)
-        raise ValueError(f"cannot write {_shown(path)}: the name of a {kind} ends in one of {endings}.")
+        raise ValueError(f"cannot write {_short(path)}: the name of a {kind} ends in one of {endings}.")
     return check_writable(path)
 
 
@@ -93,7 +93,7 @@ def reading(path: str | os.PathLike[str], most: int | None = None) -> Iterator[B
             wrong = f"it has {status.st_size} bytes, more than {most}"
         if wrong is not None:
             os.close(number)
-            raise ValueError(f"cannot read {_shown(path)}: {wrong}.")
+            raise ValueError(f"cannot read {_short(path)}: {wrong}.")
         with os.fdopen(number, "rb") as file:
             yield file
 
@@ -109,7 +109,7 @@ def read_text(path: str | os.PathLike[str], most: int) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ValueError(f"cannot read {_shown(path)}: it is not text in UTF-8.") from None
+        raise ValueError(f"cannot read {_short(path)}: it is not text in UTF-8.") from None
 
 
 def _plain(value: Any) -> Any:
@@ -121,9 +121,9 @@ def _plain(value: Any) -> Any:
 def _path(what: str, path: Any) -> Path:
     """`path` as a `Path`; numbers of open files, and text that no path can be, are refused."""
     if not isinstance(path, str | os.PathLike) or not isinstance(os.fspath(path), str):
-        raise ValueError(f"cannot {what} {_shown(path)}: it is a {type(path).__name__}, not the path of a file.")
+        raise ValueError(f"cannot {what} {_short(path)}: it is a {type(path).__name__}, not the path of a file.")
     if "\0" in str(path):
-        raise ValueError(f"cannot {what} {_shown(path)}: no path has a zero byte.")
+        raise ValueError(f"cannot {what} {_short(path)}: no path has a zero byte.")
     return Path(path)
 
 
@@ -135,16 +135,16 @@ def _target(path: Any) -> Path:
             mode = target.stat().st_mode
         except FileNotFoundError:
             if not target.parent.is_dir():
-                raise ValueError(f"cannot write {_shown(path)}: there is no folder {str(target.parent)!r}.") from None
+                raise ValueError(f"cannot write {_short(path)}: there is no folder {str(target.parent)!r}.") from None
             return target
         except NotADirectoryError:
-            raise ValueError(f"cannot write {_shown(path)}: there is no folder {str(target.parent)!r}.") from None
+            raise ValueError(f"cannot write {_short(path)}: there is no folder {str(target.parent)!r}.") from None
         if stat.S_ISDIR(mode):
-            raise ValueError(f"cannot write {_shown(path)}: it is a folder.")
+            raise ValueError(f"cannot write {_short(path)}: it is a folder.")
         if not stat.S_ISREG(mode):
-            raise ValueError(f"cannot write {_shown(path)}: it is not a regular file.")
+            raise ValueError(f"cannot write {_short(path)}: it is not a regular file.")
         if not os.access(target, os.W_OK):
-            raise ValueError(f"cannot write {_shown(path)}: it is write-protected.")
+            raise ValueError(f"cannot write {_short(path)}: it is write-protected.")
     return target
 
 
@@ -157,7 +157,7 @@ def _beside(target: Path, mode: int | None) -> tuple[Path, BinaryIO]:
     return temporary, file
 
 
-def _shown(path: Any) -> str:
+def _short(path: Any) -> str:
     text = repr(str(path))
     return text if len(text) <= 300 else f"{text[:150]} ... {text[-100:]}"
 
@@ -167,4 +167,4 @@ def _clearly(what: str, path: Any) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise ValueError(f"cannot {what} {_shown(path)}: {error.strerror or error}.") from error
+        raise ValueError(f"cannot {what} {_short(path)}: {error.strerror or error}.") from error

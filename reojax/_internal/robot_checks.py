@@ -184,10 +184,10 @@ def _add_pairs(fields: dict[str, Any], pairs: Any) -> None:
         fields["collision_pairs"] = check_pairs(pairs, fields["capsule_link"])
         return
     fields["collision_pairs"], touching = default_pairs(fields)
-    fields["notes"] += _touching(touching, [fields["link_names"][i] for i in fields["capsule_link"]])
+    fields["notes"] += _note_of_touching(touching, [fields["link_names"][i] for i in fields["capsule_link"]])
 
 
-def _touching(pairs: Sequence[tuple[int, int]], links: Sequence[str]) -> tuple[str, ...]:
+def _note_of_touching(pairs: Sequence[tuple[int, int]], links: Sequence[str]) -> tuple[str, ...]:
     """A note that says how many pairs of capsules touch at rest, and on which links, given each capsule's."""
     between = list(dict.fromkeys(f"{shorten(links[a])} and {shorten(links[b])}" for a, b in pairs))
     if not between:

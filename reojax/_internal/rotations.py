@@ -35,21 +35,21 @@ def stumpff(order: int, square: jax.Array) -> jax.Array:
     return jnp.where(near, series, closed())
 
 
-def cross_matrix(u: jax.Array) -> jax.Array:
+def hat(u: jax.Array) -> jax.Array:
     """Matrix of the cross product with `u` (3,)."""
     x, y, z = u
     zero = jnp.zeros_like(x)
     return jnp.stack([zero, -z, y, z, zero, -x, -y, x, zero]).reshape(3, 3)
 
 
-def cross_matrix_squared(u: jax.Array) -> jax.Array:
+def hat_squared(u: jax.Array) -> jax.Array:
     """Its square, `u u^T - |u|^2`."""
     return u[:, None] * u[None, :] - jnp.sum(u * u) * jnp.eye(3, dtype=u.dtype)
 
 
 def matrix_of_quaternion(w: jax.Array, u: jax.Array, square: jax.Array | float = 1.0) -> jax.Array:
     """Rotation of the quaternion (w, u) whose squared length is `square`."""
-    return jnp.eye(3, dtype=u.dtype) + (2 / square) * (w * cross_matrix(u) + cross_matrix_squared(u))
+    return jnp.eye(3, dtype=u.dtype) + (2 / square) * (w * hat(u) + hat_squared(u))
 
 
 def unit_quaternion(r: jax.Array) -> jax.Array:

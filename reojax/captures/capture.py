@@ -151,13 +151,13 @@ def read_capture(path: str | os.PathLike[str], robot: Robot, *, angle_unit: str 
     capture = Capture(
         time=np.array(time),
         theta=np.array(theta) if columns.joints else None,
-        rotation=_rotations(np.array(rotation), bool(columns.quaternion)) if columns.oriented else None,
+        rotation=_rotations(np.array(rotation), bool(columns.quaternion)) if columns.has_orientation else None,
         ignored=columns.ignored,
     )
     for k, name in enumerate(robot.joint_names[: len(columns.joints)]):
         if not capture.seen_theta[:, k].any():
             raise ValueError(f"{path}: no line has an angle of joint {name!r}.")
-    if columns.oriented and not capture.seen_rotation.any():
+    if columns.has_orientation and not capture.seen_rotation.any():
         raise ValueError(f"{path}: no line has an orientation.")
     return capture
 

@@ -34,7 +34,7 @@ class Columns(NamedTuple):
     """Headers of the other columns."""
 
     @property
-    def oriented(self) -> bool:
+    def has_orientation(self) -> bool:
         """Whether there is an orientation."""
         return bool(self.quaternion or self.zxz)
 

@@ -112,16 +112,16 @@ def compare(
     if motion is None and not capture.seen_rotation.any():
         raise ValueError("the capture has no orientation, and no motion is given: there is nothing to compare.")
     if motion is not None:
-        motion = _sampled(motion)
+        motion = _as_sampled(motion)
         if motion.theta.shape[1] != robot.joints:
             raise ValueError(f"`motion` has {motion.theta.shape[1]} joints; {robot.name!r} has {robot.joints}.")
     if offset is not None:
         offset = float(number("offset", offset, unit="s"))
-    found = _compared(robot, capture, motion, offset)
+    found = _compare(robot, capture, motion, offset)
     return found._replace(hint=_hint(robot, capture, motion, offset, found.worst_rms))
 
 
-def _compared(robot: Robot, capture: Capture, motion: Sampled | None, offset: float | None) -> Comparison:
+def _compare(robot: Robot, capture: Capture, motion: Sampled | None, offset: float | None) -> Comparison:
     """The comparison, of checked input."""
     simulated = joints_simulated(robot, capture) if motion is None else motion
     if motion is None:
@@ -140,7 +140,7 @@ def _hint(robot: Robot, capture: Capture, motion: Sampled | None, offset: float 
     least, hint = min(LARGE, error / 3), ""
     for what, mended in suspects(capture):
         try:
-            left = _compared(robot, mended, motion, offset).worst_rms
+            left = _compare(robot, mended, motion, offset).worst_rms
         except ValueError:  # angles that are far too large when mended
             continue
         if left < least:
@@ -151,7 +151,7 @@ def _hint(robot: Robot, capture: Capture, motion: Sampled | None, offset: float 
     return hint
 
 
-def _sampled(motion: Simulated) -> Sampled:
+def _as_sampled(motion: Simulated) -> Sampled:
     """The motion as arrays.
 
     Raises:

@@ -26,14 +26,14 @@ def suspects(capture: Capture) -> Iterator[tuple[str, Capture]]:
         for order, places in _ORDERS.items():
             for inverse in (False, True):
                 if order or inverse:
-                    rotation = _reordered(capture.rotation, seen, places, inverse)
+                    rotation = _reorder(capture.rotation, seen, places, inverse)
                     yield " and ".join(filter(None, (order, _INVERSE * inverse))), capture._replace(rotation=rotation)
     if capture.theta is not None:
         yield "the joint angles seem to be degrees taken for radians", capture._replace(theta=np.deg2rad(capture.theta))
         yield "the joint angles seem to be radians taken for degrees", capture._replace(theta=np.rad2deg(capture.theta))
 
 
-def _reordered(rotation: np.ndarray, seen: np.ndarray, places: tuple[int, ...], inverse: bool) -> np.ndarray:
+def _reorder(rotation: np.ndarray, seen: np.ndarray, places: tuple[int, ...], inverse: bool) -> np.ndarray:
     """The rotations, their quaternions' entries put in place and turned round; what was not seen stays so."""
     from scipy.spatial.transform import Rotation
 

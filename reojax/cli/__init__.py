@@ -56,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         _tell(f"reojax: it does not fit into memory. {error}".rstrip())
         return 2
     except OSError as error:
-        return _unprinted(error)
+        return _without_output(error)
     return 0
 
 
@@ -69,11 +69,11 @@ def _flush() -> int:
     try:
         sys.stdout.flush()
     except OSError as error:
-        return _unprinted(error)
+        return _without_output(error)
     return 0
 
 
-def _unprinted(error: OSError) -> int:
+def _without_output(error: OSError) -> int:
     """Status where stdout takes no more: 0 if its reader has enough (`| head`)."""
     _discard(sys.stdout)
     if isinstance(error, BrokenPipeError):

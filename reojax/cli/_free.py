@@ -25,7 +25,7 @@ def add_free(parser: argparse.ArgumentParser) -> None:
     add("--corners", type=int, metavar="N", help="free corners of a free path [8 for up to 4 joints, then fewer]")
 
 
-def asked(args: argparse.Namespace) -> list[str]:
+def options_given(args: argparse.Namespace) -> list[str]:
     """The options that ask for a free path."""
     return [option for name, option in OPTIONS.items() if getattr(args, name) is not None]
 

@@ -57,12 +57,12 @@ def run(args: argparse.Namespace) -> None:
 def _write(robot: "Robot", path: "Path", args: argparse.Namespace) -> dict[str, Any]:
     import jax
 
-    from reojax.files.points import sampled
+    from reojax.files.points import sample
     from reojax.files.trajectories import write_trajectory
     from reojax.mechanics.dynamics import inverse_dynamics
 
     trajectory = plan_motion(path, args)
-    points = sampled(trajectory, args.rate)
+    points = sample(trajectory, args.rate)
     effort = None
     if args.torques:
         effort = jax.jit(jax.vmap(inverse_dynamics, (None, 0, 0, 0)))(robot, *points[1:])

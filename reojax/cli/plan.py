@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from reojax._internal.version import version
 from reojax.cli._arguments import BadInput
 from reojax.cli._clearance import add_clearance
-from reojax.cli._free import add_free, asked, free
+from reojax.cli._free import add_free, free, options_given
 from reojax.cli._numbers import degrees, whole
 from reojax.cli._page import add_page, check_page, write_page
 from reojax.cli._picture import add_picture, check_picture
@@ -126,7 +126,7 @@ def _read_matrix(name: str) -> "np.ndarray":
 
 def _choose(robot: "Robot", args: argparse.Namespace) -> None:
     """Decide what the plan is made of, where that is not said."""
-    given = asked(args)
+    given = options_given(args)
     if args.vocabulary is None:
         args.vocabulary = "free" if robot.layout is None or given else "manoeuvres"
     if args.vocabulary != "free" and given:

@@ -122,7 +122,7 @@ def _robot(args: argparse.Namespace) -> "Robot":
         return load_robot(
             args.robot,
             base=args.base,
-            lock=_locked(args),
+            lock=_lock_positions(args),
             gear_ratio=_numbers("--gear", args.gear),
             rotor_inertia=_numbers("--rotor", args.rotor),
             repair=args.repair,
@@ -132,7 +132,7 @@ def _robot(args: argparse.Namespace) -> "Robot":
         raise ValueError(str(error)) from None
 
 
-def _locked(args: argparse.Namespace) -> dict[str, float]:
+def _lock_positions(args: argparse.Namespace) -> dict[str, float]:
     """Positions in the file's units: degrees become radians where the joint turns."""
     import math
 

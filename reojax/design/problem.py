@@ -94,16 +94,16 @@ class Problem:
 
         self.cost = cost
         # measures and the loops' own conditions apart: the latter are cheap, and need no derivative of the rotation
-        self._equality = self._measured(equality), self._conditions("equality")
+        self._equality = self._in_a_row(equality), self._conditions("equality")
         self._clear = tuple(measure for measure in inequality if isinstance(measure, ClearBy))
         levels = range(TIGHTENED + 1 if self._clear else 1)
         tightened = [[m.tighter(k) if isinstance(m, ClearBy) else m for m in inequality] for k in levels]
         last = self._conditions("inequality")
-        self._inequalities = [(self._measured(measures), last) for measures in tightened]
+        self._inequalities = [(self._in_a_row(measures), last) for measures in tightened]
         self._inequality = self._inequalities[0]
         self._least = jax.jit(jax.vmap(lambda x: self.outcome(x).clearance.distance))
 
-    def _measured(self, measures: Sequence[Measure]) -> Vector:
+    def _in_a_row(self, measures: Sequence[Measure]) -> Vector:
         def function(x: Array) -> Array:
             outcome = self.outcome(x)
             return _concatenate(x, [measure(outcome) for measure in measures])

@@ -48,17 +48,17 @@ def points_of(movement: Movement, *, durations: ArrayLike | None, law: Law | str
         if durations is not None:
             raise ValueError(f"`durations` is given; a {type(movement).__name__} has its own.")
         if isinstance(movement, Trajectory):
-            return sampled(movement, rate)
+            return sample(movement, rate)
         time, *state = (np.asarray(x, float) for x in movement[:4])
         onward = np.diff(time, prepend=-np.inf) > 0  # edges that take no time repeat a point
         return Points(time[onward], *(x[onward] for x in state))
     path = _path(movement)
     if durations is None:
         raise ValueError(f"`durations` is missing: a {type(movement).__name__} has no time; give seconds of each edge.")
-    return sampled(along(path, law, durations), rate)
+    return sample(along(path, law, durations), rate)
 
 
-def sampled(trajectory: Trajectory, rate: float) -> Points:
+def sample(trajectory: Trajectory, rate: float) -> Points:
     """Even points from the start to the end of a trajectory, about `rate` a second.
 
     Raises:

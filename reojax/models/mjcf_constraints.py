@@ -31,12 +31,12 @@ def constraints_of(
         elif kind == mujoco.mjtEq.mjEQ_JOINT:
             yield name, word, (), tuple(joints[i] for i in ids if i >= 0)
         elif kind == mujoco.mjtEq.mjEQ_TENDON:
-            yield name, word, *_wrapped(model, [i for i in ids if i >= 0], bodies, joints)
+            yield name, word, *_tendon_ties(model, [i for i in ids if i >= 0], bodies, joints)
         else:  # soft bodies: nothing that locking joints can meet
             yield name, word, (), tuple(joints)
 
 
-def _wrapped(model: Any, tendons: list[int], bodies: list[str], joints: list[str]) -> tuple[tuple, tuple]:
+def _tendon_ties(model: Any, tendons: list[int], bodies: list[str], joints: list[str]) -> tuple[tuple, tuple]:
     """Links and joints that tendons run over."""
     import mujoco
 

@@ -107,7 +107,7 @@ def _solve(
     """Optimise from all starts, restore the best, and stretch it to what the motors give."""
     task, box = functions.task, functions.box
     found = optimise_together(
-        functions.sampled, starts, lower=box.lower, upper=box.upper, scale=box.scale,
+        functions.at_samples, starts, lower=box.lower, upper=box.upper, scale=box.scale,
         data=np.tile(wanted, (len(starts), 1)), tolerance=_TOLERANCE, slope_tolerance=_SLOPE, max_steps=max_steps,
         progress=progress,
     )  # fmt: skip

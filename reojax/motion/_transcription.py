@@ -87,7 +87,7 @@ class Transcription:
         self.linearise = with_jacobian(self._exact)
         self.rotation_left = jax.jit(self._rotation_left)
 
-    def sampled(self, x: Array, wanted: Array) -> tuple[Array, Array, Array]:
+    def at_samples(self, x: Array, wanted: Array) -> tuple[Array, Array, Array]:
         """Cost, what must be zero, and what must not be positive, as the optimiser sees them.
 
         Args:

@@ -86,7 +86,7 @@ def overlap(
     high = np.concatenate([np.full(2 * count, 1.5 * total), np.full(joints, 2.0), [1.5 * total]])
     low[-1] = 0.2 * total
     scale = np.concatenate([np.full(2 * count, 0.2 * total), np.full(joints, 0.3), [total]])
-    goal = net_rotation(*_doubled(robot, path))
+    goal = net_rotation(*_as_double(robot, path))
     task = Task(robot, check_motors(motors, robot), goal, False, build, lambda x: x[-1], order, apart)
     return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
@@ -146,7 +146,7 @@ def free_law(
     high = np.concatenate([3 * durations, np.full(edges * points, 1.2)])
     scale = np.concatenate([0.5 * durations, np.full(edges * points, 0.3)])
     cost = lambda x: x[:edges].sum()
-    goal = net_rotation(*_doubled(robot, path))
+    goal = net_rotation(*_as_double(robot, path))
     task = Task(robot, check_motors(motors, robot), goal, True, build, cost, lambda x: x[:0], apart)
     return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
@@ -223,7 +223,7 @@ def _apart(robot: Robot, margin: float | None, postures: dict[str, np.ndarray]) 
     return Apart(*check_clearance(robot, margin, postures))
 
 
-def _doubled(robot: Robot, path: Path) -> tuple[Robot, Path]:
+def _as_double(robot: Robot, path: Path) -> tuple[Robot, Path]:
     """Both in float64, whatever they were made of."""
     return jax.tree.map(lambda leaf: np.array(leaf, float), (robot, path))
 

@@ -8,12 +8,12 @@ from matplotlib.figure import Figure
 
 from reojax.captures.comparison import Comparison
 from reojax.drawing.colours import ANGLES, AXES, DASHES, INK, JOINTS
-from reojax.plot._asked import asked
+from reojax.plot._arguments import check_arguments
 from reojax.plot._style import dress, legend_above
 from reojax.robot import Robot
 
 
-@asked
+@check_arguments
 def comparison_figure(robot: Robot, comparison: Comparison, *, title: str | None = None) -> Figure:
     """Draw a comparison: lines are simulated, dots measured.
 

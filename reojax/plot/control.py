@@ -13,14 +13,14 @@ from reojax._internal.arrays import Array
 from reojax.drawing.colours import ANGLES, INK, JOINTS
 from reojax.mechanics.attitude import tilt_and_roll
 from reojax.motion.closed_loop import Tracking
-from reojax.plot._asked import asked
+from reojax.plot._arguments import check_arguments
 from reojax.plot._style import dress, legend_above
 from reojax.robot import Robot
 
 _DASHED = (4, 2)
 
 
-@asked
+@check_arguments
 def tracking_figure(
     robot: Robot, tracking: Tracking, planned: Float[Array, "m 3 3"], *, title: str | None = None
 ) -> Figure:
@@ -65,7 +65,7 @@ def tracking_figure(
     return figure
 
 
-@asked
+@check_arguments
 def bandwidth_figure(bandwidth: ArrayLike, lag: dict[str, np.ndarray], chosen: dict[str, float]) -> Figure:
     """Draw RMS errors of the joints against the controllers' bandwidth, and the ones that were chosen.
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from reojax._internal.files import check_ending, replacing
-from reojax.plot._asked import asked
+from reojax.plot._arguments import check_arguments
 
 FORMATS = ("png", "pdf", "svg")
 """Kinds of picture, by the ending of the file's name."""
@@ -21,7 +21,7 @@ def check_picture(path: str | os.PathLike[str]) -> Path:
     return check_ending(path, "picture", FORMATS)
 
 
-@asked
+@check_arguments
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     """Write a figure to `path`, whole or not at all, in the format that the ending says.
 

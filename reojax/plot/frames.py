@@ -16,7 +16,7 @@ from reojax.drawing.colours import INK
 from reojax.drawing.view import View
 from reojax.mechanics.holonomy import rotation_history
 from reojax.path import Path
-from reojax.plot._asked import asked
+from reojax.plot._arguments import check_arguments
 from reojax.plot.robots import draw_axes, draw_robot, faces_at_pose
 from reojax.robot import Robot
 
@@ -30,7 +30,7 @@ class Frames(NamedTuple):
     """Rotation of the base, base components to inertial ones."""
 
 
-@asked
+@check_arguments
 def frames_along(robot: Robot, path: Path, *, per_edge: int = 1) -> Frames:
     """Poses of a robot along a path at zero momentum: at every corner, and `per_edge - 1` between two corners.
 
@@ -45,7 +45,7 @@ def frames_along(robot: Robot, path: Path, *, per_edge: int = 1) -> Frames:
     return Frames(theta, rotation)
 
 
-@asked
+@check_arguments
 def draw_frames(
     axes: Sequence[Axes3D],
     robot: Robot,
@@ -81,7 +81,7 @@ def draw_frames(
     return axes
 
 
-@asked
+@check_arguments
 def frames_figure(
     robot: Robot,
     path: Path,

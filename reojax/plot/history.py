@@ -18,7 +18,7 @@ from reojax.drawing.colours import ANGLES, DASHES, INK, JOINTS
 from reojax.mechanics.attitude import LEVEL, tilt_and_roll, zxz_without_jumps
 from reojax.mechanics.holonomy import rotation_history
 from reojax.path import Path
-from reojax.plot._asked import asked
+from reojax.plot._arguments import check_arguments
 from reojax.plot._style import dress_path
 from reojax.plot.nearest import draw_nearest, mark_nearest
 from reojax.robot import Robot
@@ -30,7 +30,7 @@ _SAMPLES = 64
 _EULER = (("first, about z", "#009e73"), ("second, about x", "#cc79a7"), ("third, about z", "#56b4e9"))
 
 
-@asked
+@check_arguments
 def draw_orientation(
     axes: Axes, rotations: Float[Array, "m 3 3"], *, edges: int, angles: Literal["tilt", "zxz"] = "tilt"
 ) -> Axes:
@@ -65,7 +65,7 @@ def draw_orientation(
     return axes
 
 
-@asked
+@check_arguments
 def draw_joints(axes: Axes, robot: Robot, path: Path) -> Axes:
     """Draw the joint angles of a robot along a path, in degrees; x counts the path's edges.
 
@@ -88,7 +88,7 @@ def draw_joints(axes: Axes, robot: Robot, path: Path) -> Axes:
     return axes
 
 
-@asked
+@check_arguments
 def history_figure(
     robot: Robot,
     path: Path,

@@ -14,7 +14,7 @@ from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.drawing.colours import GREY, INK, PALE
 from reojax.drawing.view import View
-from reojax.plot._asked import asked
+from reojax.plot._arguments import check_arguments
 from reojax.plot.robots import draw_robot_flat, faces_at_pose
 from reojax.robot import Robot
 
@@ -23,7 +23,7 @@ LINES = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", INK)
 _MARKERS = "osD^vPX"
 
 
-@asked
+@check_arguments
 def draw_map(
     axes: Axes,
     x: ArrayLike,
@@ -79,7 +79,7 @@ def draw_map(
     return axes
 
 
-@asked
+@check_arguments
 def draw_loop(axes: Axes, corners: ArrayLike, *, label: str | None = None) -> Axes:
     """Draw a path in a plane of shape space over a map of it, with an arrow on every edge.
 
@@ -102,7 +102,7 @@ def draw_loop(axes: Axes, corners: ArrayLike, *, label: str | None = None) -> Ax
     return axes
 
 
-@asked
+@check_arguments
 def draw_lines(
     axes: Axes, x: ArrayLike, values: ArrayLike, *, labels: Sequence[str], points: Sequence[int] | slice | None = None
 ) -> Axes:
@@ -136,7 +136,7 @@ def draw_lines(
     return axes
 
 
-@asked
+@check_arguments
 def draw_poses(
     axes: Axes,
     robots: Robot | Sequence[Robot],

@@ -11,12 +11,12 @@ from reojax.drawing.colours import ANGLES, DASHES, GREY, INK, JOINTS
 from reojax.mechanics.attitude import tilt_and_roll
 from reojax.motion.motor import Motor
 from reojax.motion.simulation import Motion
-from reojax.plot._asked import asked
+from reojax.plot._arguments import check_arguments
 from reojax.plot._style import dress, legend_above
 from reojax.robot import Robot
 
 
-@asked
+@check_arguments
 def torque_speed_figure(
     motor: Motor,
     runs: Sequence[tuple[str, Motion]],
@@ -84,7 +84,7 @@ def torque_speed_figure(
     return figure
 
 
-@asked
+@check_arguments
 def motion_figure(robot: Robot, motion: Motion, *, title: str | None = None) -> Figure:
     """Draw a motion by time: orientation of the base, joint angles, joint rates and joint torques.
 

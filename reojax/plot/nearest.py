@@ -9,14 +9,14 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from reojax.collision.nearest import Nearest
 from reojax.drawing.colours import INK
 from reojax.drawing.view import View, default_view
-from reojax.plot._asked import asked
+from reojax.plot._arguments import check_arguments
 from reojax.plot.robots import draw_robot, poses
 from reojax.robot import Robot
 
 _MARK = "#d4006a"
 
 
-@asked
+@check_arguments
 def draw_nearest(axes: Axes3D, robot: Robot, nearest: Nearest, *, view: View | None = None) -> Axes3D:
     """Draw the robot where its parts are nearest to each other, translucent, the two nearest points joined by a line.
 
@@ -45,7 +45,7 @@ def _across(robot: Robot, nearest: Nearest) -> View:
     return max(turned, key=lambda v: np.linalg.norm((v.camera() @ along)[:2]))
 
 
-@asked
+@check_arguments
 def mark_nearest(axes: Axes, at: float) -> None:
     """Draw a line where the parts are nearest to each other, at the place `at` on the x of `axes`."""
     axes.axvline(at, color=_MARK, linewidth=1.4, linestyle=(0, (4, 2)), zorder=1.5)

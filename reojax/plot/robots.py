@@ -21,12 +21,12 @@ from reojax.drawing.capsules import capsule_faces
 from reojax.drawing.colours import INK, link_colour
 from reojax.drawing.solids import Faces, joint_faces, link_faces
 from reojax.drawing.view import View, check_view, default_view
-from reojax.plot._asked import asked
+from reojax.plot._arguments import check_arguments
 from reojax.plot._light import shade
 from reojax.robot import Robot
 
 
-@asked
+@check_arguments
 def draw_robot(
     axes: Axes3D,
     robot: Robot,
@@ -82,7 +82,7 @@ def draw_robot(
     return axes
 
 
-@asked
+@check_arguments
 def draw_robot_flat(
     axes: Axes,
     robot: Robot,
@@ -125,7 +125,7 @@ def draw_robot_flat(
     return axes
 
 
-@asked
+@check_arguments
 def draw_axes(axes: Axes3D, length: float, *, at: ArrayLike = (0.0, 0.0, 0.0), names: Sequence[str] = "xyz") -> Axes3D:
     """Draw the directions x, y and z as lines of `length` [m] with their names at the ends.
 

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from reojax._internal.display_units import display_unit
 from reojax.drawing.colours import GREY, INK, PALE
-from reojax.plot._asked import asked
+from reojax.plot._arguments import check_arguments
 
 if TYPE_CHECKING:
     from reojax.sweeps import Sweep
@@ -21,7 +21,7 @@ _ROWS, _COLUMNS = 3, 4
 """Most results, and values of a third axis, in small multiples."""
 
 
-@asked
+@check_arguments
 def sweep_figure(sweep: "Sweep", *, title: str | None = None, results: Sequence[str] | None = None) -> Figure:
     """Draw scalar results of a sweep, side by side.
 

@@ -27,7 +27,7 @@ from reojax.drawing.colours import ANGLES, DASHES, INK, JOINTS, PALE
 from reojax.drawing.view import View
 from reojax.mechanics.attitude import tilt_and_roll
 from reojax.path import Path
-from reojax.plot._asked import asked
+from reojax.plot._arguments import check_arguments
 from reojax.plot.frames import Frames, check_frames, directions, extent, frames_along, stage
 from reojax.plot.robots import draw_robot
 from reojax.robot import Robot
@@ -40,7 +40,7 @@ _HOLD = 1.0
 """How long the last pose stays [s]."""
 
 
-@asked
+@check_arguments
 def animation(
     robot: Robot,
     path: Path,

@@ -38,7 +38,7 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
     xp, cast = kind_of_arrays(robot, inertia)
     wanted = cast(inertia)
     if wanted.shape or (is_concrete(wanted) and not 0 < wanted < np.inf):
-        raise ValueError(f"`inertia` is {_told(wanted)}; it must be one positive, finite number, in kg m^2.")
+        raise ValueError(f"`inertia` is {_text(wanted)}; it must be one positive, finite number, in kg m^2.")
     mass, com, moment, axes, anchor = map(
         kind_of_arrays(robot)[1], (robot.mass, robot.com, robot.inertia, robot.axis, robot.anchor)
     )
@@ -184,9 +184,9 @@ def _per_joint(
         raise ValueError(f"`{entry}` has shape {array.shape}; it must be one number or ({robot.joints},).")
     if is_concrete(array) and not ((np.isfinite(array) | (not finite)) & (array >= least)).all():
         rule = "finite" if least == -np.inf else "finite and not negative"
-        raise ValueError(f"`{entry}` is {_told(array)}; it must be {rule}.")
+        raise ValueError(f"`{entry}` is {_text(array)}; it must be {rule}.")
     return xp.broadcast_to(array, (robot.joints,))
 
 
-def _told(array: Any) -> str:
+def _text(array: Any) -> str:
     return shorten(array.tolist() if is_concrete(array) else array)

@@ -33,7 +33,7 @@ def complete(
     damaged = {number for number in missing if store.has(number)}
     several = jax.process_count() > 1
     if several:
-        missing = _agreed(missing, mine)
+        missing = _agree_on(missing, mine)
     else:
         random.Random(os.urandom(8)).shuffle(missing)
     show = jax.process_index() == 0 and progress
@@ -64,7 +64,7 @@ def complete(
     return {design: reason for bad in found.values() for design, reason in bad.items()}
 
 
-def _agreed(missing: Sequence[int], mine: range) -> list[int]:
+def _agree_on(missing: Sequence[int], mine: range) -> list[int]:
     """Chunks that are missing as the first process sees it, the same list in every process."""
     from jax.experimental import multihost_utils
 

@@ -92,7 +92,7 @@ def clip_of(robot: Robot, motion: Any, *, entry: str = "motion", certificate: bo
             f"`{entry}` is a {type(motion).__name__}; it must be a Path, a Plan, a Trajectory, or hold `time`, `theta` "
             "and `rotation` as a Motion does."
         )
-    return _sampled(robot, motion, entry)
+    return _by_time(robot, motion, entry)
 
 
 def nearest_on_clock(robot: Robot, clip: Clip) -> NearestOnClock:
@@ -108,7 +108,7 @@ def nearest_on_clock(robot: Robot, clip: Clip) -> NearestOnClock:
     return NearestOnClock(place, float(np.interp(place.at, np.arange(len(clip.clock)), clip.clock)), own)
 
 
-def measured_and_simulated(robot: Robot, comparison: Comparison) -> tuple[Clip, Clip]:
+def clips_of_comparison(robot: Robot, comparison: Comparison) -> tuple[Clip, Clip]:
     """Simulated motion of a comparison, and the measured one where something was seen; else it goes as simulated."""
     c = comparison
     theta = np.where(np.isfinite(c.measured_theta), c.measured_theta, c.simulated_theta)
@@ -125,7 +125,7 @@ def measured_and_simulated(robot: Robot, comparison: Comparison) -> tuple[Clip, 
     rotation = c.measured_rotation if turned.any() else c.simulated_rotation
     measured = _Samples(c.time[seen] - c.time[0], theta[seen], rotation[seen])
     simulated = _Samples(c.time - c.time[0], c.simulated_theta, c.simulated_rotation)
-    clips = [_sampled(robot, part, "motion", start=0.0) for part in (simulated, measured)]
+    clips = [_by_time(robot, part, "motion", start=0.0) for part in (simulated, measured)]
     return clips[0], clips[1]._replace(notes=(*clips[1].notes, *notes))
 
 
@@ -160,7 +160,7 @@ def _along(robot: Robot, path: Path, entry: str, certified: bool | None) -> Clip
     return _thin(clip, "corners", len(corners))
 
 
-def _sampled(robot: Robot, motion: Any, entry: str, start: float | None = None) -> Clip:
+def _by_time(robot: Robot, motion: Any, entry: str, start: float | None = None) -> Clip:
     """A motion by time; the clock is zero at `start`, default its first sample."""
     time = checks.numbers(f"{entry}.time", np.asarray(motion.time), (-1,))
     theta = checks.numbers(f"{entry}.theta", np.asarray(motion.theta), (-1, -1))

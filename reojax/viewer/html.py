@@ -21,7 +21,7 @@ from reojax.drawing.colours import ANGLES, AXES, JOINTS
 from reojax.drawing.view import View, default_view
 from reojax.robot import Robot
 from reojax.viewer import numbers
-from reojax.viewer.clip import Clip, clip_of, measured_and_simulated, nearest_on_clock
+from reojax.viewer.clip import Clip, clip_of, clips_of_comparison, nearest_on_clock
 from reojax.viewer.scene import clip_data, robot_data, shorten, table
 
 _SCRIPTS = ("kinematics", "stage", "curves", "player")
@@ -93,7 +93,7 @@ def view(
     if isinstance(motion, Comparison):
         if ghost is not None:
             raise ValueError("`ghost` is the measured motion where `motion` is a Comparison; leave it out.")
-        simulated, measured = measured_and_simulated(robot, motion)
+        simulated, measured = clips_of_comparison(robot, motion)
         shown.append(("simulated", robot, simulated))
     else:
         measured = None if ghost is None else clip_of(robot, ghost, entry="ghost", certificate=certificate)

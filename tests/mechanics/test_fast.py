@@ -23,7 +23,7 @@ from reojax.mechanics._fast.nodes import NODES, path_nodes
 from reojax.mechanics._fast.parameters import components, flatten, known_parameters, parameters, pattern_of, split
 from reojax.mechanics._fast.quaternions import ordered_product, products_up_to, to_matrix
 from reojax.mechanics._fast.recursion import inward, solve
-from reojax.mechanics._fast.scalar import scaled
+from reojax.mechanics._fast.scalar import scale
 from reojax.mechanics._fast.sincos import sincos
 from reojax.robots.random import random_robot
 
@@ -57,7 +57,7 @@ def test_recursion_is_the_connection(robot, known):
     @jax.jit
     def omega(theta, rate):
         base = inward(components(numbers, robot.parent), [sincos(angle) for angle in theta], list(rate))
-        return jnp.stack(jnp.broadcast_arrays(*solve(base.inertia, scaled(-1, base.momentum))))
+        return jnp.stack(jnp.broadcast_arrays(*solve(base.inertia, scale(-1, base.momentum))))
 
     connections = jax.vmap(lambda theta: reojax.connection(robot, theta))(theta.T)
     np.testing.assert_allclose(omega(theta, rate), np.einsum("nak,kn->an", connections, rate), atol=1e-12)

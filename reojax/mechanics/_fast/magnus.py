@@ -29,7 +29,7 @@ from reojax._internal.quaternions import product
 from reojax.mechanics._fast.materialize import materialize
 from reojax.mechanics._fast.nodes import LEGENDRE, NODES, WEIGHTS, per_step
 from reojax.mechanics._fast.quaternions import Quaternion, Triple
-from reojax.mechanics._fast.scalar import cross, dot, mul, plus, scaled
+from reojax.mechanics._fast.scalar import cross, dot, mul, plus, scale
 from reojax.mechanics._fast.sincos import horner, sincos
 
 _MOMENTS = WEIGHTS[:, None] * LEGENDRE
@@ -93,7 +93,7 @@ def step_rotations(omega: Triple) -> Step:
     s = jnp.asarray(np.tile(NODES - 0.5, omega[0].shape[0] // len(NODES)), omega[0].dtype)
     # 1. Mean: u = exp((s - 1/2) wbar) (omega - wbar)
     mean = _spread(omega, _MEAN_AT_NODES)
-    u = materialize(_rotate(scaled(s, mean), plus(omega, scaled(-1, mean))))
+    u = materialize(_rotate(scale(s, mean), plus(omega, scale(-1, mean))))
     # 2. Fer: U, the running integral of u, and v = (exp(U) - J(U)) u
     turned = _spread(u, _INTEGRAL)
     v = materialize(_fer(u, turned))
@@ -101,15 +101,15 @@ def step_rotations(omega: Triple) -> Step:
     m = _moments(v, _USED)
     first = m[0]
     for a, b in pairwise(m):
-        first = plus(first, scaled(0.5, cross(a, b)))
+        first = plus(first, scale(0.5, cross(a, b)))
     # all together: exp(wbar / 2) P(1) exp(U(1)) exp(wbar / 2)
-    half = materialize(_exp(scaled(0.5, _moments(omega, 1)[0])))
+    half = materialize(_exp(scale(0.5, _moments(omega, 1)[0])))
     inner = materialize(product(_exp_small(first), _exp_small(_moments(u, 1)[0])))
     rotation = materialize(product(product(half, inner), half))
 
     def turns() -> tuple[Triple, ...]:
         # exp((s - 1/2) wbar), then exp(U), then P to first order
-        return scaled(s, mean), turned, _spread(v, _INTEGRAL)
+        return scale(s, mean), turned, _spread(v, _INTEGRAL)
 
     def inside(vectors: Triple) -> Triple:
         for turn in turns():
@@ -119,7 +119,7 @@ def step_rotations(omega: Triple) -> Step:
     def back(vectors: Triple) -> Triple:
         vectors = materialize(_spread(vectors, _SHARES))  # of a mean over the step
         for turn in reversed(turns()):
-            vectors = _rotate(scaled(-1, turn), vectors)
+            vectors = _rotate(scale(-1, turn), vectors)
         return materialize(vectors)
 
     return Step(rotation, half, inside, back)
@@ -134,20 +134,20 @@ def _rotate(by: Triple, vectors: Triple) -> Triple:
     """Turn vectors by rotation vectors below a half turn: `v + sinc b x v + cosc b x (b x v)`, by power series."""
     square = jnp.minimum(dot(by, by), _SERIES_END)
     p = cross(by, vectors)
-    return plus(vectors, plus(scaled(horner(_SIN1, square), p), scaled(horner(_COS2, square), cross(by, p))))
+    return plus(vectors, plus(scale(horner(_SIN1, square), p), scale(horner(_COS2, square), cross(by, p))))
 
 
 def _fer(u: Triple, turned: Triple) -> Triple:
     """`(exp(U) - J(U)) u`: the power series of both, less each other, in `U x u` and `U x (U x u)`."""
     square = jnp.minimum(dot(turned, turned), _SERIES_END)
     p = cross(turned, u)
-    return plus(scaled(horner(_FER_1, square), p), scaled(horner(_FER_2, square), cross(turned, p)))
+    return plus(scale(horner(_FER_1, square), p), scale(horner(_FER_2, square), cross(turned, p)))
 
 
 def _exp_small(vector: Triple) -> Quaternion:
     """Quaternion of a rotation vector below a turn, by power series."""
     square = jnp.minimum(0.25 * dot(vector, vector), _SERIES_END)
-    return horner(_COS0, square), *scaled(mul(0.5, horner(_SIN1, square)), vector)
+    return horner(_COS0, square), *scale(mul(0.5, horner(_SIN1, square)), vector)
 
 
 def _exp(vector: Triple) -> Quaternion:
@@ -160,4 +160,4 @@ def _exp(vector: Triple) -> Quaternion:
     # power series near zero
     near = jnp.where(small, square, 0.0)
     k = 0.5 * jnp.where(small, horner(_SIN1[:4], near), s / angle)
-    return jnp.where(small, horner(_COS0[:4], near), c), *scaled(k, vector)
+    return jnp.where(small, horner(_COS0[:4], near), c), *scale(k, vector)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from reojax.mechanics._fast.materialize import materialize
 from reojax.mechanics._fast.parameters import RobotScalars
 from reojax.mechanics._fast.recursion import apply_symmetric, joint_rotation
-from reojax.mechanics._fast.scalar import Matrix, Scalar, Symmetric, Vector, apply, cross, mul, plus, scaled, transpose
+from reojax.mechanics._fast.scalar import Matrix, Scalar, Symmetric, Vector, apply, cross, mul, plus, scale, transpose
 
 Pair = tuple[Vector, Vector]
 """Angular velocity and velocity of the origin; or linear and angular momentum about the origin."""
@@ -34,21 +34,21 @@ def angular_momentum(
     motion: list[Pair] = [(omega, velocity)]
     for k in joints:
         w, v = outward(E[k], robot.anchor[k], motion[robot.parent[k]])
-        motion.append(kept((plus(w, scaled(rate[k], robot.axis[k])), v)))
+        motion.append(keep_pair((plus(w, scale(rate[k], robot.axis[k])), v)))
     # of each link: p = m v + w x f, h = J w + f x v
     bodies = zip(robot.mass, robot.moment, robot.inertia, motion, strict=True)
     momentum = [body_momentum(m, f, J, *of_link) for m, f, J, of_link in bodies]
     # inward: p + E p', h + E h' + a x E p', and the rotors
     for k in reversed(joints):
         parent = robot.parent[k]
-        rotor = scaled(mul(rate[k], robot.rotor_momentum[k]), robot.axis[k])
-        momentum[parent] = onto_parent(E[k], robot.anchor[k], momentum[parent], kept(momentum[k + 1]), rotor)
+        rotor = scale(mul(rate[k], robot.rotor_momentum[k]), robot.axis[k])
+        momentum[parent] = onto_parent(E[k], robot.anchor[k], momentum[parent], keep_pair(momentum[k + 1]), rotor)
     # from the base's origin to the centre
     p, h = momentum[0]
-    return plus(h, scaled(-1, cross(centre, p)))
+    return plus(h, scale(-1, cross(centre, p)))
 
 
-def kept(pair: Pair) -> Pair:
+def keep_pair(pair: Pair) -> Pair:
     """Keep both vectors together."""
     six = materialize((*pair[0], *pair[1]))
     return six[:3], six[3:]
@@ -63,7 +63,7 @@ def outward(E: Matrix, anchor: Vector, motion: Pair) -> Pair:
 
 def body_momentum(m: Scalar, f: Vector, J: Symmetric, w: Vector, v: Vector) -> Pair:
     """Return the momentum of one link alone."""
-    return plus(scaled(m, v), cross(w, f)), plus(apply_symmetric(J, w), cross(f, v))
+    return plus(scale(m, v), cross(w, f)), plus(apply_symmetric(J, w), cross(f, v))
 
 
 def onto_parent(E: Matrix, anchor: Vector, own: Pair, beyond: Pair, rotor: Vector) -> Pair:

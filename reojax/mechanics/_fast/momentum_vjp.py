@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from reojax.mechanics._fast.materialize import materialize
-from reojax.mechanics._fast.momentum_jvp import Pair, body_momentum, kept, onto_parent, outward
+from reojax.mechanics._fast.momentum_jvp import Pair, body_momentum, keep_pair, onto_parent, outward
 from reojax.mechanics._fast.parameters import RobotScalars
 from reojax.mechanics._fast.recursion import joint_rotation
 from reojax.mechanics._fast.scalar import (
@@ -36,7 +36,7 @@ from reojax.mechanics._fast.scalar import (
     dot,
     mul,
     plus,
-    scaled,
+    scale,
     sub,
 )
 
@@ -68,8 +68,8 @@ def slopes(
     for k in joints:
         parent, anchor = robot.parent[k], robot.anchor[k]
         w, v = outward(E[k], anchor, actual[parent])
-        actual.append(kept((plus(w, scaled(rate[k], robot.axis[k])), v)))
-        virtual.append(kept(outward(E[k], anchor, virtual[parent])))
+        actual.append(keep_pair((plus(w, scale(rate[k], robot.axis[k])), v)))
+        virtual.append(keep_pair(outward(E[k], anchor, virtual[parent])))
     # momenta of each link alone, in both motions
     bodies = list(zip(robot.mass, robot.moment, robot.inertia, strict=True))
     momentum = [body_momentum(*body, *motion) for body, motion in zip(bodies, actual, strict=True)]
@@ -78,12 +78,12 @@ def slopes(
     of_joints: list[Any] = [None] * len(joints)
     for k in reversed(joints):
         link, parent, e = k + 1, robot.parent[k], robot.axis[k]
-        momentum[link], likewise[link] = kept(momentum[link]), kept(likewise[link])
+        momentum[link], likewise[link] = keep_pair(momentum[link]), keep_pair(likewise[link])
         of_joints[k] = joint_slopes(
             E[k], e, sine_cosine[k], rate[k], robot.rotor_momentum[k],
             momentum[link], likewise[link], actual[link], virtual[link], virtual[parent][0],
         )  # fmt: skip
-        rotor = scaled(mul(rate[k], robot.rotor_momentum[k]), e)
+        rotor = scale(mul(rate[k], robot.rotor_momentum[k]), e)
         momentum[parent] = onto_parent(E[k], robot.anchor[k], momentum[parent], momentum[link], rotor)
         likewise[parent] = onto_parent(E[k], robot.anchor[k], likewise[parent], likewise[link], (0, 0, 0))
     of_links = [body_slopes(*motions) for motions in zip(actual, virtual, strict=True)]
@@ -149,19 +149,19 @@ def joint_slopes(
     `virtual_before` is the virtual angular velocity of the link before, which carries the joint's rotor.
     """
     (p, h), (p_, h_), (w, v), (w_, v_), (s, c) = momentum, momentum_, motion, virtual, sine_cosine
-    u = plus(w, scaled(mul(-1, rate), e))  # the joint's own rate turns with its axis
+    u = plus(w, scale(mul(-1, rate), e))  # the joint's own rate turns with its axis
     # a turn of all beyond the joint, about any axis: h~ x u + p~ x v + h x w~ + p x v~
     turning = plus(plus(cross(h_, u), cross(p_, v)), plus(cross(h, w_), cross(p, v_)))
     if not all(isinstance(x, int) for x in e):  # or else only one of the three is needed
         turning = materialize(turning)
     # a change of the unit axis: the turn that it makes at this angle, and the rate's and the rotor's direction
-    turned = plus(scaled(s, turning), scaled(sub(c, 1), cross(turning, e)))
-    moved = plus(h_, scaled(rotor, virtual_before))
+    turned = plus(scale(s, turning), scale(sub(c, 1), cross(turning, e)))
+    moved = plus(h_, scale(rotor, virtual_before))
     along = dot(e, w_)
     return JointSlopes(
         theta=dot(e, turning),
         rate=add(dot(e, h_), mul(rotor, along)),
-        axis=plus(turned, scaled(rate, moved)),
+        axis=plus(turned, scale(rate, moved)),
         anchor=apply(E, plus(cross(p_, u), cross(p, w_))),  # E (p~ x u + p x w~)
         rotor_momentum=mul(rate, along),
     )

@@ -50,7 +50,7 @@ from reojax.mechanics._fast.quaternions import (
     to_matrix,
 )
 from reojax.mechanics._fast.recursion import AT_ONCE, Base, inward, solve
-from reojax.mechanics._fast.scalar import Symmetric, Vector, cross, plus, scaled
+from reojax.mechanics._fast.scalar import Symmetric, Vector, cross, plus, scale
 from reojax.mechanics._fast.sincos import sincos
 from reojax.robot import Robot
 
@@ -147,7 +147,7 @@ def _steps_of_path(problem: RotationProblem, numbers: jax.Array, points: jax.Arr
         base = inward(problem.robot(split(numbers)), [sincos(a) for a in theta], rate)
         like = theta[0]
     # A omega = -L, thesis eq. 2.14
-    return step_rotations(materialize(_at_nodes(solve(base.inertia, scaled(-1, base.momentum)), like)))
+    return step_rotations(materialize(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), like)))
 
 
 class NodeSolution(NamedTuple):
@@ -165,7 +165,7 @@ class NodeSolution(NamedTuple):
 
     def change_of_omega(self, change: Vector) -> Triple:
         """What a change of the momentum at a fixed motion of the base does to omega: `-A^-1 dL`."""
-        return materialize(_at_nodes(solve(self.inertia, scaled(-1, change)), self.omega[0]))
+        return materialize(_at_nodes(solve(self.inertia, scale(-1, change)), self.omega[0]))
 
 
 def _solution(base: Base, like: jax.Array) -> NodeSolution:
@@ -173,8 +173,8 @@ def _solution(base: Base, like: jax.Array) -> NodeSolution:
     centre, drift = materialize(base.centre), moving[3:]
     inertia = materialize(base.inertia)
     # A omega = -L, thesis eq. 2.14; the base's origin moves so that the centre of mass rests
-    omega = materialize(_at_nodes(solve(inertia, scaled(-1, moving[:3])), like))
-    velocity = materialize(scaled(-1, plus(drift, cross(omega, centre))))
+    omega = materialize(_at_nodes(solve(inertia, scale(-1, moving[:3])), like))
+    velocity = materialize(scale(-1, plus(drift, cross(omega, centre))))
     # attitude at the middle frame of each step: the product of the steps before, and half of its mean turn
     step = step_rotations(omega)
     to_step = materialize(product(shift(products_up_to(step.rotation), 1), step.half))

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 
 from reojax._internal.quaternions import matrix_rows, product
 from reojax.mechanics._fast.materialize import materialize
-from reojax.mechanics._fast.scalar import cross, plus, scaled
+from reojax.mechanics._fast.scalar import cross, plus, scale
 
 Quaternion = tuple[jax.Array, ...]
 """w, x, y, z."""
@@ -16,8 +16,8 @@ Triple = tuple[jax.Array, ...]
 def rotate(q: Quaternion, v: Triple) -> Triple:
     """Return the vector `v` turned by the unit quaternion `q`."""
     u = q[1:]
-    twice = scaled(2, cross(u, v))
-    return plus(plus(v, scaled(q[0], twice)), cross(u, twice))
+    twice = scale(2, cross(u, v))
+    return plus(plus(v, scale(q[0], twice)), cross(u, twice))
 
 
 def to_matrix(q: Quaternion) -> jax.Array:

@@ -29,7 +29,7 @@ from reojax.mechanics._fast.scalar import (
     mul,
     plus,
     point_inertia,
-    scaled,
+    scale,
     sub,
     turned_inertia,
 )
@@ -89,14 +89,14 @@ def inward(
 def hand_on(link: Subtree, E: Matrix, e: Vector, anchor: Vector, rate: Scalar, rotor: Scalar) -> Subtree:
     """What a joint hands on to the link that it hangs from: the equations of the module's first lines."""
     # the joint's rate turns all beyond it about e
-    turned_push = plus(link.push, scaled(rate, cross(e, link.moment)))
-    turned_spin = plus(link.spin, scaled(rate, apply_symmetric(link.inertia, e)))
+    turned_push = plus(link.push, scale(rate, cross(e, link.moment)))
+    turned_spin = plus(link.spin, scale(rate, apply_symmetric(link.inertia, e)))
     # into the frame of the link before, and to its origin
     push, spin, moment = (apply(E, vector) for vector in (turned_push, turned_spin, link.moment))
-    own_rotor = scaled(mul(rate, rotor), e)
+    own_rotor = scale(mul(rate, rotor), e)
     return Subtree(
         mass=link.mass,
-        moment=plus(moment, scaled(link.mass, anchor)),  # E f + m a
+        moment=plus(moment, scale(link.mass, anchor)),  # E f + m a
         inertia=plus(turned_inertia(E, link.inertia), _shift(link.mass, moment, anchor)),  # E J E^T, moved by a
         push=push,  # E (p + rate e x f)
         spin=plus(plus(spin, own_rotor), cross(anchor, push)),  # E (h + rate J e) + rotor + a x p'
@@ -117,10 +117,10 @@ def keep(link: Subtree) -> Subtree:
 def about_centre(whole: Subtree) -> Base:
     """Inertia and momentum of the whole robot about its centre of mass, of what hangs on its base."""
     # c = f / m, and what it moves at
-    centre, drift = (scaled(1 / whole.mass, vector) for vector in (whole.moment, whole.push))
+    centre, drift = (scale(1 / whole.mass, vector) for vector in (whole.moment, whole.push))
     return Base(
-        inertia=plus(whole.inertia, scaled(-1, point_inertia(whole.mass, centre))),  # J - m (|c|^2 - c c^T)
-        momentum=plus(whole.spin, scaled(-1, cross(centre, whole.push))),  # h - c x p
+        inertia=plus(whole.inertia, scale(-1, point_inertia(whole.mass, centre))),  # J - m (|c|^2 - c c^T)
+        momentum=plus(whole.spin, scale(-1, cross(centre, whole.push))),  # h - c x p
         centre=centre,
         drift=drift,
     )
@@ -153,16 +153,16 @@ def joint_rotation(e: Vector, s: Scalar, c: Scalar) -> Matrix:
 def _shift(mass: Scalar, moment: Vector, a: Vector) -> Symmetric:
     """What moving by `a` adds to the inertia of a body of `mass` and first `moment`."""
     # 2 (a . g) - (a g^T + g a^T) with g = E f + m a / 2
-    g = plus(moment, scaled(mul(0.5, mass), a))
+    g = plus(moment, scale(mul(0.5, mass), a))
     x, y, z = (mul(p, q) for p, q in zip(a, g, strict=True))
     products = tuple(add(mul(a[i], g[j]), mul(a[j], g[i])) for i, j in ((0, 1), (0, 2), (1, 2)))
-    return (*scaled(2, (add(y, z), add(x, z), add(x, y))), *scaled(-1, products))
+    return (*scale(2, (add(y, z), add(x, z), add(x, y))), *scale(-1, products))
 
 
 def solve(A: Symmetric, right: Vector) -> Vector:
     """Solve `A x = right`, `A` symmetric positive definite."""
     adjugate, determinant = _adjugate(A)
-    return scaled(1 / determinant, apply_symmetric(adjugate, right))
+    return scale(1 / determinant, apply_symmetric(adjugate, right))
 
 
 def _adjugate(A: Symmetric) -> tuple[Symmetric, Scalar]:

@@ -18,7 +18,7 @@ from reojax.mechanics._fast.momentum_vjp import body_slopes, joint_slopes
 from reojax.mechanics._fast.nodes import NODES, per_step, sum_over_nodes
 from reojax.mechanics._fast.parameters import Parameters
 from reojax.mechanics._fast.recursion import Base, Subtree, about_centre, hand_on, joint_rotation, keep
-from reojax.mechanics._fast.scalar import Vector, add, cross, plus, scaled
+from reojax.mechanics._fast.scalar import Vector, add, cross, plus, scale
 from reojax.mechanics._fast.sincos import sincos
 
 Columns = tuple[Any, ...]
@@ -105,13 +105,13 @@ def angular_momentum(
         (link, before), (s, c, rate), e, a, rotor = x
         p, h = _halves(_read(columns, link))
         nothing = (0, 0, 0)
-        handed = onto_parent(joint_rotation(e, s, c), a, (nothing, nothing), (p, h), scaled(rate * rotor, e))
+        handed = onto_parent(joint_rotation(e, s, c), a, (nothing, nothing), (p, h), scale(rate * rotor, e))
         return _add(columns, before, materialize((*handed[0], *handed[1]))), None
 
     every = (_places(parent), motion, _split(robot.axis), _split(robot.anchor), robot.rotor_momentum)
     columns, _ = jax.lax.scan(joint, momenta, every, reverse=True)
     p, h = _halves(tuple(x[0] for x in columns))
-    return plus(h, scaled(-1, cross(centre, p)))
+    return plus(h, scale(-1, cross(centre, p)))
 
 
 def slopes(
@@ -139,7 +139,7 @@ def slopes(
         found = joint_slopes(E, e, (s, c), rate, rotor, momentum, momentum_, motion_, virtual_, w_before)
         # both momenta onto the link before
         nothing = (0, 0, 0)
-        handed = onto_parent(E, a, (nothing, nothing), momentum, scaled(rate * rotor, e))
+        handed = onto_parent(E, a, (nothing, nothing), momentum, scale(rate * rotor, e))
         handed_ = onto_parent(E, a, (nothing, nothing), momentum_, nothing)
         columns = (
             _add(columns[0], before, materialize((*handed[0], *handed[1]))),
@@ -179,7 +179,7 @@ def _outward(robot: Parameters, parent: tuple[int, ...], motion: Motion, base: V
     def joint(columns: Columns, x: Any) -> tuple[Columns, None]:
         (link, before), (s, c, rate), e, a = x
         w, v = outward(joint_rotation(e, s, c), a, _halves(_read(columns, before)))
-        w = plus(w, scaled(rate, e)) if moving else w
+        w = plus(w, scale(rate, e)) if moving else w
         return _write(columns, link, materialize((*w, *v))), None
 
     every = (_places(parent), motion, _split(robot.axis), _split(robot.anchor))

@@ -89,7 +89,7 @@ def plus(a: tuple[Scalar, ...], b: tuple[Scalar, ...]) -> tuple[Any, ...]:
     return tuple(add(x, y) for x, y in zip(a, b, strict=True))
 
 
-def scaled(s: Scalar, a: tuple[Scalar, ...]) -> tuple[Any, ...]:
+def scale(s: Scalar, a: tuple[Scalar, ...]) -> tuple[Any, ...]:
     """Return a vector or a symmetric matrix scaled by `s`."""
     return tuple(mul(s, x) for x in a)
 
@@ -117,7 +117,7 @@ def point_inertia(mass: Scalar, d: Vector) -> Symmetric:
     x, y, z = d
     xx, yy, zz = mul(x, x), mul(y, y), mul(z, z)
     products = (mul(x, y), mul(x, z), mul(y, z))
-    return scaled(mass, (add(yy, zz), add(xx, zz), add(xx, yy), *scaled(-1, products)))
+    return scale(mass, (add(yy, zz), add(xx, zz), add(xx, yy), *scale(-1, products)))
 
 
 def transpose(matrix: Matrix) -> Matrix:

@@ -80,16 +80,16 @@ def runge_kutta_step(
     count, dtype = len(method.node), rotation.dtype
     start = (jnp.zeros(3, dtype), jax.tree.map(jnp.asarray, state))  # rotation vector from the start, and y
 
-    def moved(part: jax.Array, slopes: Any) -> Any:
+    def advance(part: jax.Array, slopes: Any) -> Any:
         return jax.tree.map(lambda y, k: y + h * jnp.tensordot(part, k, 1, precision="highest"), start, slopes)
 
-    def turned(u: jax.Array) -> jax.Array:
+    def turn(u: jax.Array) -> jax.Array:
         return jnp.matmul(rotation, so3.exp(u), precision="highest")
 
     def stage(slopes: Any, inputs: Any) -> tuple[Any, None]:
         index, part, node = inputs
-        u, y = moved(part, slopes)  # where this stage looks: what the earlier slopes make of the start
-        omega, slope = rates(turned(u), y, node)
+        u, y = advance(part, slopes)  # where this stage looks: what the earlier slopes make of the start
+        omega, slope = rates(turn(u), y, node)
         return jax.tree.map(lambda all_, k: all_.at[index].set(k), slopes, (_dexp_inverse(u, omega), slope)), None
 
     none_yet = jax.tree.map(lambda y: jnp.zeros((count, *y.shape), y.dtype), start)
@@ -97,8 +97,8 @@ def runge_kutta_step(
     every = (jnp.arange(count), jnp.asarray(method.stages, dtype), chosen)
     slopes, _ = jax.lax.scan(stage, none_yet, every)  # a loop: one stage to compile
     # the step: R exp(u), so that R stays a rotation
-    u, y = moved(jnp.asarray(method.weights, dtype), slopes)
-    return turned(u), y
+    u, y = advance(jnp.asarray(method.weights, dtype), slopes)
+    return turn(u), y
 
 
 def _dexp_inverse(u: Array, omega: Array) -> Array:

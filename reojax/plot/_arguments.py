@@ -43,7 +43,7 @@ _KINDS: dict[str, tuple[type, str]] = {
 }
 
 
-def asked(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
+def check_arguments(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
     """Check the arguments by the types that the signature names: robots, words, numbers, arrays of numbers."""
     signature = inspect.signature(function)
     rules = {name: _words(parameter.annotation) for name, parameter in signature.parameters.items()}
@@ -52,7 +52,7 @@ def asked(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
     def drawn(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
         bound = signature.bind(*args, **kwargs)
         for entry, value in bound.arguments.items():
-            bound.arguments[entry] = _checked(entry, value, rules[entry])
+            bound.arguments[entry] = _check(entry, value, rules[entry])
         return function(*bound.args, **bound.kwargs)
 
     return drawn
@@ -66,7 +66,7 @@ def _words(annotation: Any) -> list[str]:
     return re.sub(r"\b(?:\w+\.)+(\w+)", r"\1", text).split(" | ")
 
 
-def _checked(entry: str, value: Any, words: list[str]) -> Any:
+def _check(entry: str, value: Any, words: list[str]) -> Any:
     if value is None and "None" in words:
         return value
     first = words[0]
@@ -83,14 +83,14 @@ def _checked(entry: str, value: Any, words: list[str]) -> Any:
     if first == "numbers":
         return np.asarray(as_numbers(entry, value), float)
     if first == "Sequence[str]":
-        return [checks.instance(f"{entry}[{i}]", word, str, "'a word'") for i, word in _enumerated(entry, value)]
+        return [checks.instance(f"{entry}[{i}]", word, str, "'a word'") for i, word in _enumerate(entry, value)]
     if first.startswith("dict["):
         return checks.mapping(entry, value, "names to numbers")
     if first.startswith("Sequence["):
-        return [item for _, item in _enumerated(entry, value)]
+        return [item for _, item in _enumerate(entry, value)]
     return value
 
 
-def _enumerated(entry: str, value: Any) -> list[tuple[int, Any]]:
+def _enumerate(entry: str, value: Any) -> list[tuple[int, Any]]:
     listed = list(value) if isinstance(value, str) else checks.listing(entry, value, "one thing for each")
     return list(enumerate(listed))
