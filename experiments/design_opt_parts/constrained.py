@@ -13,21 +13,14 @@ from common.proof import prove
 
 import reojax
 from design_opt_parts.in_time import SLOPE, in_time, least_time, times_of, total
+from design_opt_parts.manoeuvre_a import joint_travel, manoeuvre_problem
 from reojax import RE_MAX_17, design, so3
-from reojax.design import Outcome, Problem, Variable
 from reojax.motion.least_time import AVAILABLE
-from reojax.robots import prototype, with_end_inertia, with_gear_ratio
 
-INERTIA, RATIO = (10.0, 190.0), (1.0, 48.0)
-"""End link inertia [kg mm^2] and gear ratio."""
 _EDGES = 4
 """Edges of manoeuvre A."""
 _STARTS = [[*np.deg2rad(loop), 1e-6 * inertia, ratio, *[0.4] * _EDGES]
            for loop, inertia, ratio in (([200, 80], 100, 24), ([260, 110], 70, 16), ([240, 100], 130, 36))]  # fmt: skip
-
-
-def _travel(outcome: Outcome) -> Any:
-    return 4 * outcome.values["twist"] + 2 * outcome.values["bend"]
 
 
 def choices(roll: float, clearance: float, *, quick: bool = False) -> list[dict[str, Any]]:
@@ -36,9 +29,9 @@ def choices(roll: float, clearance: float, *, quick: bool = False) -> list[dict[
     in_the_fall = lambda outcome: total(outcome) - 1
     near = f"{1e3 * clearance:g} mm"
     cases = [
-        ("least travel", _travel, []),
-        (f"least travel, {near}", _travel, [apart]),
-        (f"least travel, {near}, within the fall", _travel, [apart, needs, in_the_fall]),
+        ("least travel", joint_travel, []),
+        (f"least travel, {near}", joint_travel, [apart]),
+        (f"least travel, {near}, within the fall", joint_travel, [apart, needs, in_the_fall]),
         (f"least time, {near}", total, [apart, needs]),
     ]
     rows = []
@@ -48,22 +41,7 @@ def choices(roll: float, clearance: float, *, quick: bool = False) -> list[dict[
 
 
 def _row(name: str, aim: Any, conditions: list[Any], roll: float, margin: float) -> dict[str, Any]:
-    problem = Problem(
-        lambda values: (
-            with_gear_ratio(with_end_inertia(prototype(), values["inertia"]), values["ratio"]),
-            reojax.manoeuvre_a(values["twist"], values["bend"]),
-        ),
-        [
-            Variable("twist", 0, 270, "deg"),
-            Variable("bend", 0, 120, "deg"),
-            Variable("inertia", *INERTIA, "kg mm^2"),
-            Variable("ratio", *RATIO),
-            times_of(_EDGES),
-        ],
-        objective=aim,
-        equality=[design.turned_about([0, 0, 1], roll)],
-        inequality=conditions,
-    )
+    problem = manoeuvre_problem(roll, aim, conditions, [times_of(_EDGES)])
     held = {} if len(conditions) > 1 else {"times": [1.0] * _EDGES}  # no condition has to do with them
     found = problem.solve(np.array(_STARTS), hold=held, max_steps=60, slope_tolerance=SLOPE, progress=name)
     best = problem.outcome(found.value[found.best])
@@ -77,7 +55,7 @@ def _row(name: str, aim: Any, conditions: list[Any], roll: float, margin: float)
         "bend_deg": float(np.rad2deg(values["bend"])),
         "inertia_kg_mm2": 1e6 * values["inertia"],
         "ratio": values["ratio"],
-        "travel_deg": float(np.rad2deg(_travel(best))),
+        "travel_deg": float(np.rad2deg(joint_travel(best))),
         "time_ms": 1e3 * float(least_time(best, RE_MAX_17).duration),
         "clearance_mm": 1e3 * float(best.clearance.distance),
         "off_axis_deg": float(np.rad2deg(np.linalg.norm(off))),

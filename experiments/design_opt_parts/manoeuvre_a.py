@@ -12,8 +12,10 @@ INERTIA, RATIO = (10.0, 190.0), (1.0, 48.0)
 """Range of the end link inertia [kg mm^2], and of the gear ratio, as in the thesis."""
 
 
-def manoeuvre_problem(roll: float, objective: Any, conditions: Sequence[Any] = ()) -> Problem:
-    """Least `objective` with the roll [rad] given, its off-axis part left free."""
+def manoeuvre_problem(
+    roll: float, objective: Any, conditions: Sequence[Any] = (), more: Sequence[Variable] = ()
+) -> Problem:
+    """Least `objective` with the roll [rad] given, its off-axis part left free; `more` variables for the conditions."""
     return Problem(
         lambda values: (
             with_gear_ratio(with_end_inertia(prototype(), values["inertia"]), values["ratio"]),
@@ -24,6 +26,7 @@ def manoeuvre_problem(roll: float, objective: Any, conditions: Sequence[Any] = (
             Variable("bend", 0, 120, "deg"),
             Variable("inertia", *INERTIA, "kg mm^2"),
             Variable("ratio", *RATIO),
+            *more,
         ],
         objective=objective,
         equality=[design.turned_about([0, 0, 1], roll)],
