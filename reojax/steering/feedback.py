@@ -6,7 +6,8 @@ the angular momentum, a wire's drag and chosen parameters of the robot. It goes 
     R' = R hat(A^-1 (B theta' + R^T H)),      H' = -drag R omega,
 
 and an orientation that comes late is compared at the time when it was taken. What the estimate says of the end of the
-motion goes to the law of `correction_gains`, as it runs on board (`reojax.steering.onboard`).
+motion is taken back by the least change of the joints that does (`reojax.steering.prediction`); with `steps=0` it goes
+to the law of `correction_gains` instead, as it runs on board (`reojax.steering.onboard`).
 """
 
 from __future__ import annotations
@@ -28,10 +29,14 @@ from reojax.robot import Robot
 from reojax.steering.clear_of_itself import keep_of
 from reojax.steering.drift import drift_of
 from reojax.steering.estimator import Model
-from reojax.steering.gains import correction_gains
+from reojax.steering.gains import correction_gains, spread
 from reojax.steering.law import SteeringLaw
+from reojax.steering.least_change import Effort
 from reojax.steering.prediction import bias_of
 from reojax.steering.tables import gain_table
+
+_BUMPS = 13
+"""Bumps at least, where they are not asked for."""
 
 
 def Steering(
@@ -52,6 +57,8 @@ def Steering(
     weights: ArrayLike | None = None,
     left: float = 0.1,
     steps: int = 20,
+    bumps: int | None = None,
+    price: float = 3e-3,
     goal: ArrayLike | None = None,
     clearance: float | None = None,
 ) -> SteeringLaw:
@@ -74,9 +81,13 @@ def Steering(
         largest: largest change of a joint [rad]; the robot's limits hold too.
         samples: of each piece of the trajectory, for the tables.
         weights: (j,) price of changing each joint, as for `correction_gains`.
-        left: damping of a correction, in shares of the authority at the start.
+        left: damping of the linear law, in shares of the authority at the start.
         steps: steps of the prediction of the end by the estimated robot, at each reading; 0 takes the linear law of
             `reojax.steering.onboard` instead, which is cheaper and holds for small errors.
+        bumps: smooth changes in time of which, for each joint, a correction is made; default three a piece, at least
+            13.
+        price: square of an error that is worth a change of a joint by a radian [rad^2]: the more, the smaller the
+            changes, and the slower they follow what is estimated.
         goal: (3, 3) orientation to end in, the base starting at the identity; default where the motion ends.
         clearance: least distance between the robot's parts, from 0 up, that every posture which the joints are told is
             proven to keep [m]; default not asked. The motion must keep it. A correction that would come nearer goes
@@ -87,7 +98,8 @@ def Steering(
     """
     h = np.zeros(3) if momentum is None else momentum
     gains = correction_gains(robot, trajectory, samples=samples, weights=weights, left=left, momentum=h)
-    numbers = {"noise": noise, "wander": wander, "tau": tau, "settle": settle, "largest": largest, "drag_std": drag_std}
+    numbers = {"noise": noise, "wander": wander, "tau": tau, "settle": settle, "largest": largest}
+    numbers |= {"drag_std": drag_std, "price": price}
     for entry, value in numbers.items():
         single = np.asarray(as_numbers(entry, value))
         if (
@@ -105,12 +117,13 @@ def Steering(
     if len(own) != len(chosen):
         raise ValueError(f"`parameters_std` has {len(own)} numbers for {len(chosen)} parameters.")
     one = checks.rank(momentum_std) == 0
-    spread = np.broadcast_to(checks.numbers("momentum_std", momentum_std, () if one else (3,)), (3,))
-    std = np.concatenate([np.zeros(3), spread, [drag_std], own])
+    momenta = np.broadcast_to(checks.numbers("momentum_std", momentum_std, () if one else (3,)), (3,))
+    std = np.concatenate([np.zeros(3), momenta, [drag_std], own])
     if not (np.isfinite(std) & (std >= 0)).all():
         raise ValueError(f"standard deviations must be finite and not negative; they are {std[3:].tolist()}.")
     keep = None if clearance is None else keep_of(robot, trajectory, clearance)
     steps = checks.whole("steps", steps, 0)
+    bumps = max(_BUMPS, 3 * trajectory.pieces + 1) if bumps is None else checks.whole("bumps", bumps)
     aim = gains.rotation[-1] if goal is None else checks.rotations("goal", goal)
     dtype = common_float(robot, trajectory)
     one = partial(jnp.asarray, dtype=dtype)
@@ -121,14 +134,16 @@ def Steering(
     table = {name: one(value) for name, value in gain_table(gains).items()} | {"momentum": h, "to_end": gains.to_end}
     table["drift"] = drift_of(robot, chosen, gains, h)
     if steps:
-        table["bias"] = bias_of(robot, trajectory, table, one(gains.rotation), steps)
+        table["bias"] = bias_of(robot, trajectory, table, one(gains.rotation), steps, bumps)
+    each = jnp.ones(robot.joints, dtype) if weights is None else one(np.asarray(weights, float))
     return SteeringLaw(
         model=Model(robot, trajectory, one(noise), one(wander), chosen),
         table=table,
         goal=one(aim),
         frame=jnp.eye(3, dtype=dtype),
-        rest=one(gains.rest),
+        effort=Effort(spread(robot, each), one(price)),
         steps=steps,
+        bumps=bumps,
         start_covariance=jnp.diag(one(std) ** 2),
         tau=one(tau),
         settle=one(settle),

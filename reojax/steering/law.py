@@ -10,18 +10,21 @@ import jax.numpy as jnp
 
 from reojax import so3
 from reojax._internal.arrays import Array
+from reojax.mechanics.momentum import connection
 from reojax.robot import Robot
+from reojax.steering.bumps import bumps
 from reojax.steering.clear_of_itself import Keep, towards
 from reojax.steering.estimator import Estimate, Model, along, changed, corrected, off
+from reojax.steering.least_change import Effort, steer_to
 from reojax.steering.linear_law import row_at, smooth, steer_by
-from reojax.steering.prediction import miss_and_slope, steer_to
+from reojax.steering.prediction import Ahead, ahead_of, miss_and_slope
 from reojax.steering.readings import MEMORY, Believed, Reading, References, SteeringState, checked
 
 
 @partial(
     jax.tree_util.register_dataclass,
-    data_fields=["model", "table", "goal", "frame", "start_covariance", "rest", "tau", "settle", "largest", "keep"],
-    meta_fields=["steps"],
+    data_fields=["model", "table", "goal", "frame", "start_covariance", "effort", "tau", "settle", "largest", "keep"],
+    meta_fields=["steps", "bumps"],
 )
 @dataclasses.dataclass(frozen=True, eq=False)
 class SteeringLaw:
@@ -35,7 +38,8 @@ class SteeringLaw:
     frame: Array
     """(3, 3) orientation where the motion begins: readings are of the base to the inertial frame of the first one."""
     start_covariance: Array
-    rest: Array
+    effort: Effort
+    """Of a change of the joints, for the prediction."""
     tau: Array
     settle: Array
     largest: Array
@@ -43,11 +47,13 @@ class SteeringLaw:
     """The clearance that corrections keep, if one was asked for; `keep.proven` is that of the motion."""
     steps: int
     """Of the prediction; 0 for the linear law."""
+    bumps: int
+    """Of which changes are made; see `reojax.steering.bumps`."""
 
     def start(self) -> SteeringState:
         """State at the release: the robot as planned, at rest, oriented as the inertial frame."""
         dtype = self.model.noise.dtype
-        three = jnp.zeros(3, dtype)
+        none = jnp.zeros((self.bumps, self.model.robot.joints) if self.steps else 3, dtype)
         values = jnp.asarray([p.start for p in self.model.parameters], dtype)
         return SteeringState(
             time=jnp.zeros((), dtype),
@@ -59,9 +65,9 @@ class SteeringLaw:
             covariance=self.start_covariance,
             past_time=jnp.arange(-MEMORY, 0, dtype=dtype) * 1e-9,
             past_offset=jnp.zeros((MEMORY, self.model.robot.joints), dtype),
-            steer=three,
-            filtered=three,
-            rate=three,
+            steer=none,
+            filtered=none,
+            rate=none,
         )
 
     def step(self, state: SteeringState, reading: Reading) -> tuple[SteeringState, References]:
@@ -130,7 +136,7 @@ def _update(law: SteeringLaw, state: SteeringState, reading: Reading) -> tuple[S
     planned = law.model.trajectory.at(time).theta
     # a joint that is not read is taken to be where it is told to be
     row = row_at(law.table, time)
-    own = _told(law, planned, row["direction"] @ state.filtered)
+    own = _told(law, planned, _change(law, row, time, state.filtered))
     offset = jnp.where(jnp.isfinite(theta), theta, own) - planned
     times = jnp.concatenate([state.past_time[1:], time[None]])
     offsets = jnp.concatenate([state.past_offset[1:], offset[None]])
@@ -147,11 +153,14 @@ def _update(law: SteeringLaw, state: SteeringState, reading: Reading) -> tuple[S
     now = along(law.model, robot, state, then, until, time, times, offsets, False)
     worth = 1 - jnp.exp(-(time - state.time) / law.settle)
     if law.steps:
-        error, left, steer = _predicted(law, state, robot, now, row, time, own - planned - offset, worth)
+        ahead = _ahead(law, robot, now, drag, time, planned + offset, own)
+        left, slope = miss_and_slope(ahead, state.steer, state.filtered, state.rate)
+        error = left - jnp.einsum("anj,nj->a", slope, state.steer)
+        steer = steer_to(left, slope, state.steer, law.effort, worth, law.largest)
     else:
         error, left, steer = _linear(law, state, now, row, time, offset, worth)
     filtered, rate = smooth(steer, state.filtered, state.rate, time - state.time, law.tau)
-    told = _told(law, planned, row["direction"] @ filtered)
+    told = _told(law, planned, _change(law, row, time, filtered))
     state = SteeringState(
         time=time,
         taken=until,
@@ -169,24 +178,11 @@ def _update(law: SteeringLaw, state: SteeringState, reading: Reading) -> tuple[S
     return state, References(told, error, left)
 
 
-def _predicted(
-    law: SteeringLaw,
-    state: SteeringState,
-    robot: Robot,
-    now: Estimate,
-    row: dict[str, Array],
-    time: Array,
-    lag: Array,
-    worth: Array,
-) -> tuple[Array, Array, Array]:
-    """Error and steering by the prediction; joints that lag behind by `lag` will have turned the base by then."""
-    steering = state.steer, state.filtered, state.rate, law.tau
-    rotation = now.rotation @ so3.exp(row["connection"] @ lag)
-    here = time, rotation, now.momentum, state.drag
-    left, slope = miss_and_slope(robot, law.model.trajectory, law.table, law.goal, here, steering, law.steps)
-    ahead = jnp.where((law.table["at"] >= time)[:, None, None], law.table["direction"], 0)
-    steer = steer_to(left, slope, ahead, state.steer, worth, law.rest, law.largest)
-    return left - slope @ state.steer, left, steer
+def _ahead(law: SteeringLaw, robot: Robot, now: Estimate, drag: Array, time: Array, theta: Array, told: Array) -> Ahead:
+    """The rest of the motion; joints that lag behind what they are told will have turned the base by then."""
+    rotation = now.rotation @ so3.exp(connection(robot, theta) @ (told - theta))
+    here = time, rotation, now.momentum, drag
+    return ahead_of(robot, law.model.trajectory, law.table, law.goal, here, law.tau, law.largest, law.steps, law.bumps)
 
 
 def _linear(
@@ -208,8 +204,16 @@ def _linear(
     return error, left, steer
 
 
-def _told(law: SteeringLaw, planned: Array, back: Array) -> Array:
-    """Where the joints go: the planned posture less a correction, within the limits, and clear if that is asked."""
+def _change(law: SteeringLaw, row: dict[str, Array], time: Array, filtered: Array) -> Array:
+    """What the joints are to be less than planned."""
+    if law.steps:
+        return bumps(time, law.model.trajectory.breaks[-1], law.bumps)[0] @ filtered
+    return row["direction"] @ filtered
+
+
+def _told(law: SteeringLaw, planned: Array, change: Array) -> Array:
+    """Where the joints go: the planned posture less a change, within the limits, and clear if that is asked."""
     robot = law.model.robot
-    wanted = jnp.clip(planned - back, robot.lower, robot.upper)
+    low, high = jnp.maximum(robot.lower, planned - law.largest), jnp.minimum(robot.upper, planned + law.largest)
+    wanted = jnp.clip(planned - change, low, high)
     return wanted if law.keep is None else towards(robot, law.keep, planned, wanted)

@@ -35,7 +35,8 @@ class References(NamedTuple):
     theta: Float[Array, " j"]
     """Joint angles to go to [rad]."""
     error: Float[Array, "3"]
-    """Error of the orientation that is expected at the end if the joints kept to the plan, inertial frame [rad]."""
+    """Error of the orientation that is expected at the end if the joints kept to the plan, to first order in what they
+    are told to change; inertial frame [rad]."""
     left: Float[Array, "3"]
     """What the change under way does not take back of it [rad]."""
 
@@ -80,11 +81,11 @@ class SteeringState(NamedTuple):
     """When joints were read, the latest last [s]."""
     past_offset: Float[Array, "n j"]
     """How far they were from the motion [rad]."""
-    steer: Float[Array, "3"]
-    """Steering vector."""
-    filtered: Float[Array, "3"]
+    steer: Float[Array, "..."]
+    """How the joints are to be changed: (n, j), a number for each bump and joint [rad]; (3,) of the linear law."""
+    filtered: Float[Array, "..."]
     """The same behind the filter."""
-    rate: Float[Array, "3"]
+    rate: Float[Array, "..."]
     """Its rate."""
 
 
