@@ -16,11 +16,11 @@ from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers
 from reojax.design.loops import Loops
 from reojax.design.outcome import Measure, Outcome
-from reojax.design.self_clearance import TIGHTENED, ClearBy, prove
+from reojax.design.self_clearance import ClearBy, prove, share_of
 from reojax.design.solutions import Solutions
 from reojax.design.variables import Space, Variable, neighbours
 from reojax.mechanics.holonomy import DEFAULT_STEPS
-from reojax.optimisation.functions import Functions
+from reojax.optimisation.functions import Function, Functions
 from reojax.optimisation.optimise import Solution, choose_best, optimise
 from reojax.path import Path
 from reojax.robot import Robot
@@ -95,12 +95,9 @@ class Problem:
         self.cost = cost
         # measures and the loops' own conditions apart: the latter are cheap, and need no derivative of the rotation
         self._equality = self._in_a_row(equality), self._conditions("equality")
+        self._inequality = self._in_a_row(inequality), self._conditions("inequality")
         self._clear = tuple(measure for measure in inequality if isinstance(measure, ClearBy))
-        levels = range(TIGHTENED + 1 if self._clear else 1)
-        tightened = [[m.tighter(k) if isinstance(m, ClearBy) else m for m in inequality] for k in levels]
-        last = self._conditions("inequality")
-        self._inequalities = [(self._in_a_row(measures), last) for measures in tightened]
-        self._inequality = self._inequalities[0]
+        self._tightened = self._of_share(inequality)
         self._least = jax.jit(jax.vmap(lambda x: self.outcome(x).clearance.distance))
 
     def _in_a_row(self, measures: Sequence[Measure]) -> Vector:
@@ -109,6 +106,18 @@ class Problem:
             return _concatenate(x, [measure(outcome) for measure in measures])
 
         return function
+
+    def _of_share(self, inequality: Sequence[Measure]) -> tuple[Function, tuple[Function, ...], tuple[Function, ...]]:
+        """The problem as functions of x and how much more clearance is asked for: one program for all that is."""
+
+        def tightened(x: Array, share: Array) -> Array:
+            outcome = self.outcome(x)
+            measures = [m.tighter(share) if isinstance(m, ClearBy) else m for m in inequality]
+            return _concatenate(x, [measure(outcome) for measure in measures])
+
+        alike = lambda function: lambda x, share: function(x)
+        equality = tuple(alike(function) for function in self._equality)
+        return alike(self.cost), equality, (tightened, alike(self._inequality[1]))
 
     def _conditions(self, kind: str) -> Vector:
         def function(x: Array) -> Array:
@@ -259,13 +268,16 @@ class Problem:
         size = np.where(self.space.upper > self.space.lower, self.space.upper - self.space.lower, 1.0)
 
         def run(x: np.ndarray, rows: np.ndarray, level: int) -> Solution:
+            plain = self.cost, self._equality, self._inequality
+            cost, equality, inequality = self._tightened if self._clear else plain
             return optimise(
-                self.cost,
+                cost,
                 x,
                 lower=lower[rows],
                 upper=upper[rows],
-                equality=self._equality,
-                inequality=self._inequalities[level],
+                equality=equality,
+                inequality=inequality,
+                data=np.full(len(x), share_of(level)) if self._clear else None,
                 scale=size,
                 **limits._asdict(),
             )

@@ -9,6 +9,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from reojax._internal.arrays import Array
 from reojax.collision.clearance import without_pairs
 from reojax.collision.constraint import clearance_shortfall
 from reojax.optimisation.optimise import Solution, choose_best
@@ -28,8 +29,8 @@ class ClearBy:
     """Least distance between any two parts of the robot [m]."""
     samples: int | None = None
     """Per edge; None for 96 along the whole loop."""
-    spare: float = 0.0
-    """Asked for on top, where a proof fell short of the margin [m]."""
+    spare: float | Array = 0.0
+    """Asked for on top, where a proof fell short of the margin [m]; may be traced."""
 
     def __call__(self, outcome: Any) -> jax.Array:
         """What is missing to the margin, for an inequality.
@@ -44,9 +45,14 @@ class ClearBy:
             outcome.robot, outcome.path.waypoints, wanted, samples=self.samples, between=_BETWEEN
         )
 
-    def tighter(self, level: int) -> ClearBy:
-        """The same with more in hand: some at level 1, and three times as much at each further one."""
-        return dataclasses.replace(self, spare=(0.02 * abs(self.margin) + 1e-4) * 3.0 ** (level - 1) if level else 0.0)
+    def tighter(self, share: float | Array) -> ClearBy:
+        """The same with `share`, see `share_of`, of a fiftieth of the margin and a tenth of a mm more in hand."""
+        return dataclasses.replace(self, spare=(0.02 * abs(self.margin) + 1e-4) * share)
+
+
+def share_of(level: int) -> float:
+    """How much more is asked for at a level: nothing at 0, some at 1, and three times as much at each further one."""
+    return 3.0 ** (level - 1) if level else 0.0
 
 
 def prove(

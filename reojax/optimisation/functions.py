@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
 import jax
@@ -20,6 +20,7 @@ from reojax._internal.arrays import Array
 from reojax._internal.checks import shorten
 
 Function = Callable[..., Any]
+Part = Callable[[Array, Any], Any]
 _BLOCK, _VALUES_BLOCK = 8, 16
 """Most starts differentiated, and most points evaluated, in one call."""
 
@@ -49,7 +50,7 @@ class Functions(NamedTuple):
     together: Function | None = None
     """To (cost, equality, inequality) at once, instead of the three, where these share most of their work."""
 
-    def parts(self) -> list[Callable[[Array, Any], Any]]:
+    def parts(self) -> list[Part]:
         """Functions of x and data to lists of costs, of equalities and of inequalities, each with what it has."""
         call = lambda f, x, data: f(x, data) if self.with_data else f(x)
         one = lambda entry, f, x, data: [_array(entry, call(f, x, data))]
@@ -103,7 +104,6 @@ class Programs:
         ]
 
 
-@lru_cache(maxsize=64)
 def _compile(
     functions: Functions,
     dtype: np.dtype,
@@ -112,48 +112,79 @@ def _compile(
     types: tuple[tuple[tuple[int, ...], Any], ...],
     blocks: tuple[int, int],
 ) -> tuple[Function, Function, int]:
-    """Both programs and the number of equalities. Only the last few are kept, as they hold on to a user's functions."""
+    """Both programs and the number of equalities."""
+    point = functions, dtype, n, structure, types
+    programs = _program(*point, blocks[0], _values), _program(*point, blocks[1], _derivatives)
+    # tracing holds Python's lock, compiling does not
+    with ThreadPoolExecutor(2) as pool:
+        small, large = pool.map(lambda program: program.compiled, programs)
+    return small, large, programs[0].equalities
 
+
+class _Program:
+    """One of the two, for blocks of one size; compiled when it is first asked for."""
+
+    def __init__(self, lowered: Any, equalities: int) -> None:
+        """Keep what has been traced."""
+        self._lowered, self.equalities = lowered, equalities
+
+    @cached_property
+    def compiled(self) -> Function:
+        """The program; what it was made of is let go."""
+        compiled = self._lowered.compile()
+        del self._lowered
+        return compiled
+
+
+@lru_cache(maxsize=128)
+def _program(
+    functions: Functions,
+    dtype: np.dtype,
+    n: int,
+    structure: Any,
+    types: tuple[tuple[tuple[int, ...], Any], ...],
+    block: int,
+    kind: Callable[[list[Part], Array, Any], Any],
+) -> _Program:
+    """Trace a program. Only the last few are kept, as they hold on to a user's functions."""
     parts = functions.parts()
-
-    def values(x: Array, data: Any) -> tuple[Array, Array]:
-        found = [part(x, data) for part in parts]
-        for kinds in found:
-            _check(*kinds)
-        rows = [array for kind in (1, 2) for kinds in found for array in kinds[kind]]
-        return _total([array for kinds in found for array in kinds[0]]), _join(rows, x, 1)
-
-    def derivatives(x: Array, data: Any) -> tuple[Array, Array, Array, Array]:
-        cost, gradient, rows, jacobian = [], [], ([], []), ([], [])
-        for part in parts:
-            kinds = jax.eval_shape(part, x, data)
-            sizes = [sum(array.size for array in kind) for kind in kinds]
-            every = lambda x, part=part: _join([jnp.ravel(a) for kind in part(x, data) for a in kind], x, 1)
-            value, slope = _differentiate(every, x)
-            ends = np.cumsum(sizes)
-            if sizes[0]:
-                cost.append(value[0])
-                gradient.append(slope[0])
-            for kind in (0, 1):
-                rows[kind].append(value[ends[kind] : ends[kind + 1]])
-                jacobian[kind].append(slope[ends[kind] : ends[kind + 1]])
-        rows, jacobian = _join(rows[0] + rows[1], x, 1), _join(jacobian[0] + jacobian[1], x, 2)
-        return _total(cost), rows, _total(gradient), jacobian
-
-    def lower(function: Function, block: int) -> Any:
-        leaves = [jax.ShapeDtypeStruct((block, *shape), leaf) for shape, leaf in types]
-        x = jax.ShapeDtypeStruct((block, n), dtype)
-        many = jax.vmap(function) if block > 1 else lambda x, data: _alone(function, x, data)
-        return jax.jit(many).lower(x, jax.tree.unflatten(structure, leaves))
-
+    made = partial(kind, parts)
+    leaves = [jax.ShapeDtypeStruct((block, *shape), leaf) for shape, leaf in types]
+    data = jax.tree.unflatten(structure, leaves)
+    many = jax.vmap(made) if block > 1 else partial(_alone, made)
+    lowered = jax.jit(many).lower(jax.ShapeDtypeStruct((block, n), dtype), data)
     point = jax.ShapeDtypeStruct((n,), dtype)
     data = jax.tree.unflatten(structure, [jax.ShapeDtypeStruct(shape, leaf) for shape, leaf in types])
     equalities = sum(array.size for part in parts for array in jax.eval_shape(part, point, data)[1])
-    lowered = [lower(values, blocks[0]), lower(derivatives, blocks[1])]
-    # tracing holds Python's lock, compiling does not
-    with ThreadPoolExecutor(2) as pool:
-        small, large = pool.map(lambda program: program.compile(), lowered)
-    return small, large, equalities
+    return _Program(lowered, equalities)
+
+
+def _values(parts: list[Part], x: Array, data: Any) -> tuple[Array, Array]:
+    """Cost and constraints of a point."""
+    found = [part(x, data) for part in parts]
+    for kinds in found:
+        _check(*kinds)
+    rows = [array for kind in (1, 2) for kinds in found for array in kinds[kind]]
+    return _total([array for kinds in found for array in kinds[0]]), _join(rows, x, 1)
+
+
+def _derivatives(parts: list[Part], x: Array, data: Any) -> tuple[Array, Array, Array, Array]:
+    """Cost, constraints, gradient and Jacobian of a point."""
+    cost, gradient, rows, jacobian = [], [], ([], []), ([], [])
+    for part in parts:
+        kinds = jax.eval_shape(part, x, data)
+        sizes = [sum(array.size for array in kind) for kind in kinds]
+        every = lambda x, part=part: _join([jnp.ravel(a) for kind in part(x, data) for a in kind], x, 1)
+        value, slope = _differentiate(every, x)
+        ends = np.cumsum(sizes)
+        if sizes[0]:
+            cost.append(value[0])
+            gradient.append(slope[0])
+        for kind in (0, 1):
+            rows[kind].append(value[ends[kind] : ends[kind + 1]])
+            jacobian[kind].append(slope[ends[kind] : ends[kind + 1]])
+    rows, jacobian = _join(rows[0] + rows[1], x, 1), _join(jacobian[0] + jacobian[1], x, 2)
+    return _total(cost), rows, _total(gradient), jacobian
 
 
 def _alone(function: Function, x: Array, data: Any) -> Any:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import reojax
+from reojax.optimisation.functions import _program
 from reojax.optimisation.status import Status
 
 PROTOTYPE = reojax.robots.prototype()
@@ -31,8 +32,9 @@ def careless(monkeypatch):
 
 @pytest.mark.usefixtures("careless")
 def test_what_falls_short_between_samples_is_solved_again_or_has_not_converged(monkeypatch):
-    posed = problem()
+    posed, before = problem(), _program.cache_info().misses
     found = posed.solve(2)
+    assert _program.cache_info().misses - before <= 3  # values, and derivatives of one start or two: of every level
     proven = np.array([float(posed.outcome(x).clearance.distance) for x in found.value])
     assert found.converged[found.best]
     assert (proven[found.converged] >= MARGIN).all()
