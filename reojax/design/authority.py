@@ -13,6 +13,7 @@ from reojax._internal import checks
 from reojax._internal.arrays import Array
 from reojax.design.outcome import Measure, Outcome
 from reojax.mechanics.holonomy import rotation_history
+from reojax.mechanics.own_units import without_names
 from reojax.mechanics.variation import turn_per_change
 from reojax.path import Path
 from reojax.robot import Robot
@@ -56,6 +57,18 @@ def authority_above(least: float, *, after: float = 0.5) -> Measure:
 
 def late_authority(robot: Robot, path: Path, after: float) -> Float[Array, ""]:
     """The measure of `authority`, of one path."""
+    edges = path.edges
+    share = (np.arange(_NODES) + 0.5) / _NODES
+    place = np.arange(edges)[:, None] + share[None]
+    weight = 30 * (share * (1 - share)) ** 2 * np.ones((edges, 1)) / _NODES
+    # the first cell that is done only in part counts as much as lies ahead
+    weight = weight * np.clip((place - after * edges) * _NODES + 0.5, 0, 1)
+    return _weighted_authority(without_names(robot), path, weight.ravel())
+
+
+@jax.jit
+def _weighted_authority(robot: Robot, path: Path, weight: Float[Array, " n"]) -> Float[Array, ""]:
+    """The same with the weight of each node."""
     points = jnp.asarray(path.waypoints)
     edges = points.shape[0] - 1
     fine = 2 * _NODES
@@ -63,15 +76,11 @@ def late_authority(robot: Robot, path: Path, after: float) -> Float[Array, ""]:
     step = jnp.diff(points, axis=0)
     theta = points[:-1, None] + jnp.asarray(share, points.dtype)[None, :, None] * step[:, None]
     rotation = rotation_history(robot, path, samples=fine)[:-1].reshape(edges, fine, 3, 3)[:, 1::2]
-    place = np.arange(edges)[:, None] + share[None]
-    weight = 30 * (share * (1 - share)) ** 2 * np.ones((edges, 1)) / _NODES
-    # the first cell that is done only in part counts as much as lies ahead
-    weight = weight * np.clip((place - after * edges) * _NODES + 0.5, 0, 1)
     rates = jnp.broadcast_to(step[:, None], theta.shape)
     flat = [x.reshape(-1, *x.shape[2:]) for x in (theta, rates, rotation)]
     still = jnp.zeros(3, points.dtype)
     g, _ = jax.vmap(partial(turn_per_change, robot), (0, 0, 0, None))(flat[0], flat[1], flat[2], still)
-    gramian = jnp.einsum("n,nai,nbi->ab", jnp.asarray(weight.ravel(), points.dtype), g, g)
+    gramian = jnp.einsum("n,nai,nbi->ab", weight.astype(points.dtype), g, g)
     return _least_eigenvalue(gramian)
 
 

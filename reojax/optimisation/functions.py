@@ -144,10 +144,10 @@ def _program(
     structure: Any,
     types: tuple[tuple[tuple[int, ...], Any], ...],
     block: int,
-    kind: Callable[[list[Part], Array, Any], Any],
+    kind: Callable[[tuple[Part, ...], Array, Any], Any],
 ) -> _Program:
     """Trace a program. Only the last few are kept, as they hold on to a user's functions."""
-    parts = functions.parts()
+    parts = _traced_once(functions)
     made = partial(kind, parts)
     leaves = [jax.ShapeDtypeStruct((block, *shape), leaf) for shape, leaf in types]
     data = jax.tree.unflatten(structure, leaves)
@@ -159,7 +159,13 @@ def _program(
     return _Program(lowered, equalities)
 
 
-def _values(parts: list[Part], x: Array, data: Any) -> tuple[Array, Array]:
+@lru_cache(maxsize=64)
+def _traced_once(functions: Functions) -> tuple[Part, ...]:
+    """The parts such that sizes, values and derivatives, of any block, trace each function once for all."""
+    return tuple(jax.jit(part, inline=True) for part in functions.parts())
+
+
+def _values(parts: tuple[Part, ...], x: Array, data: Any) -> tuple[Array, Array]:
     """Cost and constraints of a point."""
     found = [part(x, data) for part in parts]
     for kinds in found:
@@ -168,7 +174,7 @@ def _values(parts: list[Part], x: Array, data: Any) -> tuple[Array, Array]:
     return _total([array for kinds in found for array in kinds[0]]), _join(rows, x, 1)
 
 
-def _derivatives(parts: list[Part], x: Array, data: Any) -> tuple[Array, Array, Array, Array]:
+def _derivatives(parts: tuple[Part, ...], x: Array, data: Any) -> tuple[Array, Array, Array, Array]:
     """Cost, constraints, gradient and Jacobian of a point."""
     cost, gradient, rows, jacobian = [], [], ([], []), ([], [])
     for part in parts:

@@ -1,9 +1,8 @@
 """Joint torques against Pinocchio and MuJoCo, whose rotors are bodies, and against the laws of energy and momentum."""
 
-import functools
+from functools import cache, partial
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -16,10 +15,12 @@ from reojax.robots.random import random_robot
 SHAPES = [(1, False), (3, False), (4, True), (7, True)]
 load = jax.jit(joint_load)
 forward = jax.jit(reojax.forward_dynamics)
+inverse = jax.jit(reojax.inverse_dynamics)
 inertia = jax.jit(reojax.joint_inertia)
+energy_of = jax.jit(reojax.kinetic_energy)
 
 
-@functools.cache
+@cache
 def moving(joints: int, branched: bool) -> tuple:
     """A random robot, its motion and its momentum, and what reojax says of them."""
     robot = random_robot(3, joints, branched=branched)
@@ -82,9 +83,9 @@ def test_torques_are_those_of_mujoco(joints, branched):
 def test_power_is_the_rate_of_the_energy(joints, branched):
     """What the joints' torques do is all that changes the kinetic energy, with a momentum too."""
     robot, theta, rate, acceleration, momentum, found = moving(joints, branched)
-    energy = jax.jit(lambda *state: reojax.kinetic_energy(robot, *state[:2], momentum=state[2]))
+    energy = lambda *state: reojax.kinetic_energy(robot, *state[:2], momentum=state[2])
     motion = (rate, acceleration, np.cross(momentum, found.omega))
-    _, power = jax.jvp(energy, (theta, rate, momentum), motion)
+    _, power = jax.jit(partial(jax.jvp, energy))((theta, rate, momentum), motion)
     np.testing.assert_allclose(power, found.torque @ rate, rtol=1e-11)
 
 
@@ -95,7 +96,7 @@ def test_forward_undoes_inverse(joints, branched):
     np.testing.assert_allclose(back, acceleration, atol=1e-10)
     matrix = inertia(robot, theta)
     np.testing.assert_allclose(matrix, matrix.T, rtol=1e-12, atol=1e-15)
-    energy = reojax.kinetic_energy(robot, theta, rate)
+    energy = energy_of(robot, theta, rate)
     np.testing.assert_allclose(0.5 * rate @ matrix @ rate, energy, rtol=1e-12)
 
 
@@ -115,7 +116,7 @@ def test_a_geared_wheel(side):
     else:
         fixed = wheel + rotor * ratio**2
     felt = fixed - coupling**2 / (body + wheel)
-    np.testing.assert_allclose(reojax.joint_inertia(robot, [0.4]), [[felt]], rtol=1e-13)
+    np.testing.assert_allclose(inertia(robot, np.array([0.4])), [[felt]], rtol=1e-13)
     found = load(robot, np.array([0.4]), np.array([0.9]), np.array([3.0]))
     np.testing.assert_allclose(found.torque, [3 * felt], rtol=1e-13)
     np.testing.assert_allclose(found.omega_dot, [0, 0, -coupling / (body + wheel) * 3], atol=1e-13)
@@ -135,11 +136,11 @@ def test_torques_differentiate_and_keep_their_dtype():
     step = 1e-5
     difference = (total(1 + step) - total(1 - step)) / (2 * step)
     np.testing.assert_allclose(jax.grad(total)(1.0), difference, rtol=1e-7)
-    many = jax.vmap(lambda push: reojax.inverse_dynamics(robot, theta, rate, push))(jnp.stack([acceleration, 0 * rate]))
+    many = jax.jit(jax.vmap(lambda push: inverse(robot, theta, rate, push)))(np.stack([acceleration, 0 * rate]))
     np.testing.assert_allclose(many[0], load(robot, theta, rate, acceleration).torque, rtol=1e-10)
     single = np.float32
     short = load(*jax.tree.map(single, (robot, theta, rate, acceleration)), momentum=single(momentum))
-    torque = reojax.inverse_dynamics(robot, single(theta), rate, acceleration, momentum=momentum)
+    torque = inverse(robot, single(theta), rate, acceleration, momentum=momentum)
     np.testing.assert_allclose(torque, short.torque, rtol=1e-4)
     assert torque.dtype == single
     assert {leaf.dtype for leaf in short} == {np.dtype(single)}
@@ -165,6 +166,6 @@ def test_bad_input_is_named(change, message):
 def test_a_robot_without_joints_has_no_torques():
     robot = random_robot(0, 0)
     nothing = np.zeros(0)
-    assert reojax.inverse_dynamics(robot, nothing, nothing, nothing).shape == (0,)
-    assert reojax.forward_dynamics(robot, nothing, nothing, nothing).shape == (0,)
-    np.testing.assert_allclose(reojax.base_velocity(robot, nothing, nothing, momentum=[0, 0, 0]), 0)
+    assert inverse(robot, nothing, nothing, nothing).shape == (0,)
+    assert forward(robot, nothing, nothing, nothing).shape == (0,)
+    np.testing.assert_allclose(jax.jit(reojax.base_velocity)(robot, nothing, nothing, momentum=np.zeros(3)), 0)

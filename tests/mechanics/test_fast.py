@@ -31,6 +31,11 @@ ROBOT = jax.tree.map(jnp.asarray, random_robot(6, 5, branched=True))
 CORNERS = jnp.asarray(np.random.default_rng(6).normal(size=(3, 5)))
 
 
+matrices = jax.jit(jax.vmap(to_matrix))
+whole = jax.jit(lambda factors: to_matrix(ordered_product(factors)))
+so_far_of = jax.jit(lambda factors: jax.vmap(to_matrix)(products_up_to(factors)))
+
+
 @pytest.mark.parametrize(("dtype", "largest", "error"), [(np.float64, 1e6, 3e-16), (np.float32, 1e4, 2e-7)])
 def test_sine_and_cosine_are_what_they_promise(dtype, largest, error):
     """Against NumPy in extended precision: everywhere, at multiples of an eighth of a turn, and near zero."""
@@ -59,22 +64,22 @@ def test_recursion_is_the_connection(robot, known):
         base = inward(components(numbers, robot.parent), [sincos(angle) for angle in theta], list(rate))
         return jnp.stack(jnp.broadcast_arrays(*solve(base.inertia, scale(-1, base.momentum))))
 
-    connections = jax.vmap(lambda theta: reojax.connection(robot, theta))(theta.T)
+    connections = jax.jit(jax.vmap(lambda theta: reojax.connection(robot, theta)))(theta.T)
     np.testing.assert_allclose(omega(theta, rate), np.einsum("nak,kn->an", connections, rate), atol=1e-12)
 
 
 def test_a_step_is_the_exponential():
     """Constant rates of up to half a turn: `expm`; and rates that turn with the body, exactly solvable."""
     omega = np.random.default_rng(3).normal(size=(3, 4))
-    rotation = step_rotations(tuple(jnp.repeat(jnp.asarray(x), len(NODES)) for x in omega)).rotation
-    found = jax.vmap(to_matrix)(rotation)
+    steps = jax.jit(lambda omega: step_rotations(tuple(omega)).rotation)
+    found = matrices(steps(np.repeat(omega, len(NODES), axis=1)))
     for turned, vector in zip(found, omega.T, strict=True):
         np.testing.assert_allclose(turned, expm(np.asarray(so3.hat(vector))), atol=1e-14)
     k, t = 0.5, np.pi / 4 * (np.arange(8)[:, None] + NODES).ravel()  # R(2 pi) = exp(2 pi (0, k, 1))
     along = np.pi / 4 * k * np.stack([-np.sin(t), np.cos(t), 0 * t])
-    steps = step_rotations(tuple(jnp.asarray(x) for x in along)).rotation
+    turned = steps(along)
     exact = Rotation.from_rotvec([0, 2 * np.pi * k, 2 * np.pi]).as_matrix()
-    np.testing.assert_allclose(to_matrix(ordered_product(steps)), exact, atol=1e-13)
+    np.testing.assert_allclose(whole(turned), exact, atol=1e-13)
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 16])
@@ -85,8 +90,8 @@ def test_products_are_in_order(count):
     for matrix in turns.as_matrix():
         so_far = so_far @ matrix
         expected.append(so_far)
-    np.testing.assert_allclose(to_matrix(ordered_product(factors)), expected[-1], atol=1e-14)
-    np.testing.assert_allclose(jax.vmap(to_matrix)(products_up_to(factors)), np.array(expected), atol=1e-14)
+    np.testing.assert_allclose(whole(factors), expected[-1], atol=1e-14)
+    np.testing.assert_allclose(so_far_of(factors), np.array(expected), atol=1e-14)
 
 
 @pytest.mark.slow
@@ -118,14 +123,15 @@ def test_loops_over_joints_are_the_code_for_every_joint(monkeypatch):
 
 def test_nodes_of_loops_are_those_of_the_code():
     """Angles, rates, and the transpose of their dependence on the corners."""
-    theta, rate = path_nodes(CORNERS, 3)
-    motion = rolled.motion_at_nodes(CORNERS, 3)
-    np.testing.assert_allclose(motion.sine, np.sin(jnp.stack(theta)), atol=1e-14)
-    np.testing.assert_allclose(motion.rate, jnp.stack(rate), atol=1e-15)
+    nodes = lambda corners: [jnp.stack(x) for x in path_nodes(corners, 3)]
+    theta, rate = jax.jit(nodes)(CORNERS)
+    motion = jax.jit(lambda corners: rolled.motion_at_nodes(corners, 3))(CORNERS)
+    np.testing.assert_allclose(motion.sine, np.sin(theta), atol=1e-14)
+    np.testing.assert_allclose(motion.rate, rate, atol=1e-15)
     by_theta, by_rate = np.random.default_rng(0).normal(size=(2, *motion.rate.shape))
-    _, pull = jax.vjp(lambda corners: [jnp.stack(x) for x in path_nodes(corners, 3)], CORNERS)
-    expected = pull([jnp.asarray(by_theta), jnp.asarray(by_rate)])[0]
-    np.testing.assert_allclose(rolled.to_points(jnp.asarray(by_theta), jnp.asarray(by_rate), 3), expected, atol=1e-12)
+    expected = jax.jit(lambda *pull: jax.vjp(nodes, CORNERS)[1](list(pull))[0])(by_theta, by_rate)
+    found = jax.jit(lambda *pull: rolled.to_points(*pull, 3))(by_theta, by_rate)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def compiled(function, *args) -> str:
