@@ -75,7 +75,7 @@ METHODS = {
 @pytest.mark.parametrize(("solve", "order"), METHODS.values(), ids=METHODS.keys())
 def test_order_on_an_exact_case(solve, order):
     """The error falls as the power of the step that it should, from a fraction of a degree on, and R is a rotation."""
-    coarse, fine = (solve(steps) for steps in (16, 32))
+    coarse, fine = (jax.jit(solve, static_argnums=0)(steps) for steps in (16, 32))
     errors = [np.abs(np.asarray(turned) - EXACT).max() for turned in (coarse, fine)]
     assert errors[0] < 1e-3
     assert np.log2(errors[0] / errors[1]) > order - 0.4
@@ -93,7 +93,7 @@ def test_a_state_beside_the_rotation():
         return runge_kutta_step(RK4, rates, 0.02, *state, jnp.full(3, 0.2)), None
 
     start = (jnp.eye(3), (jnp.ones(()), jnp.zeros(())))
-    (turned, (x, _)), _ = jax.lax.scan(step, start, length=100)
+    (turned, (x, _)), _ = jax.jit(lambda start: jax.lax.scan(step, start, length=100))(start)
     w = np.sqrt(1 - 0.01)
     exact = np.exp(-0.2) * (np.cos(2 * w) + 0.1 / w * np.sin(2 * w))
     assert abs(x - exact) < 1e-8

@@ -15,6 +15,9 @@ from reojax.robots.random import random_robot
 
 SHAPES = [(joints, branched) for joints in range(1, 9) for branched in (False, True)]
 SEEDS = (0, 1, 2)
+matrices = jax.jit(reojax.momentum_matrices)
+connection = jax.jit(reojax.connection)
+angular_momentum = jax.jit(reojax.angular_momentum)
 net_rotation = jax.jit(reojax.net_rotation)
 rotation_history = jax.jit(reojax.rotation_history, static_argnames="samples")
 
@@ -35,7 +38,7 @@ def evaluated(joints: int, branched: bool) -> list:
     robots = [random_robot(seed, joints, branched=branched) for seed in SEEDS]
     shapes = [random_shapes(seed, joints, 2) for seed in SEEDS]
     cases = [(robot, theta) for robot, pair in zip(robots, shapes, strict=True) for theta in pair]
-    return [(*case, *map(np.asarray, reojax.momentum_matrices(*case))) for case in cases]
+    return [(*case, *map(np.asarray, matrices(*case))) for case in cases]
 
 
 # --- other people's code ---------------------------------------------------------------------------------
@@ -79,7 +82,7 @@ def test_rotors_are_seen_by_the_oracles():
         robot.replace(rotor_on=other_side),
         robot.replace(gear_ratio=robot.gear_ratio + 1),
     ):
-        assert relative(reojax.momentum_matrices(wrong, theta)[1], exact) > 1e-4
+        assert relative(matrices(wrong, theta)[1], exact) > 1e-4
 
 
 # --- momentum itself -------------------------------------------------------------------------------------
@@ -145,16 +148,16 @@ def test_angular_momentum_is_the_thesis_s(joints):
     theta, theta_dot = random_shapes(5, joints, 2)
     omega = np.array([0.3, -1.1, 0.7])
     exact = barycentric.momentum(robot, theta, theta_dot, omega)
-    assert relative(reojax.angular_momentum(robot, theta, theta_dot, omega), exact) < 1e-12
+    assert relative(angular_momentum(robot, theta, theta_dot, omega), exact) < 1e-12
 
 
 @pytest.mark.parametrize(("joints", "branched"), [(1, False), (3, True), (6, False)])
 def test_connection_leaves_no_momentum(joints, branched):
     robot = random_robot(6, joints, branched=branched)
     theta, theta_dot = random_shapes(6, joints, 2)
-    omega = reojax.connection(robot, theta) @ theta_dot
-    left = reojax.angular_momentum(robot, theta, theta_dot, omega)
-    from_joints = reojax.angular_momentum(robot, theta, theta_dot, np.zeros(3))
+    omega = np.asarray(connection(robot, theta)) @ theta_dot
+    left = angular_momentum(robot, theta, theta_dot, omega)
+    from_joints = angular_momentum(robot, theta, theta_dot, np.zeros(3))
     assert np.linalg.norm(left) < 1e-13 * np.linalg.norm(from_joints)
 
 
@@ -162,8 +165,8 @@ def test_connection_leaves_no_momentum(joints, branched):
 def test_connection_solves_the_momentum_equation(joints, branched):
     robot = random_robot(7, joints, branched=branched)
     theta = random_shapes(7, joints)[0]
-    A, B = map(np.asarray, reojax.momentum_matrices(robot, theta))
-    assert relative(reojax.connection(robot, theta), np.linalg.solve(A, B)) < 1e-12
+    A, B = map(np.asarray, matrices(robot, theta))
+    assert relative(connection(robot, theta), np.linalg.solve(A, B)) < 1e-12
 
 
 @pytest.mark.parametrize(("joints", "branched"), [(0, False), (1, False), (8, True)])
@@ -171,7 +174,7 @@ def test_locked_inertia_is_a_rigid_body_s(joints, branched):
     """Symmetric, positive definite, and no principal moment above the sum of the other two."""
     robot = random_robot(8, joints, branched=branched)
     for theta in random_shapes(8, joints, 5):
-        A = np.asarray(reojax.momentum_matrices(robot, theta).A)
+        A = np.asarray(matrices(robot, theta).A)
         assert np.abs(A - A.T).max() <= 1e-15 * np.abs(A).max()
         small, middle, large = np.linalg.eigvalsh(A)
         assert small > 0
@@ -182,11 +185,11 @@ def test_a_robot_without_joints():
     """One rigid body: A is its inertia, nothing can turn it, and its momentum is that of a rigid body."""
     robot = random_robot(9, 0)
     theta = np.zeros(0)
-    A, B = reojax.momentum_matrices(robot, theta)
+    A, B = matrices(robot, theta)
     assert relative(A, robot.inertia[0]) < 1e-15
-    assert B.shape == reojax.connection(robot, theta).shape == (3, 0)
+    assert B.shape == connection(robot, theta).shape == (3, 0)
     omega = np.array([1.0, 2.0, 3.0])
-    assert relative(reojax.angular_momentum(robot, theta, theta, omega), robot.inertia[0] @ omega) < 1e-15
+    assert relative(angular_momentum(robot, theta, theta, omega), robot.inertia[0] @ omega) < 1e-15
     net = net_rotation(robot, reojax.polygon(np.zeros((3, 0))))
     assert np.array_equal(net, np.eye(3))
 
@@ -202,9 +205,9 @@ def test_float32_is_kept_and_right_to_its_precision(branched):
     omega = np.array([0.3, -1.1, 0.7])
     low_arguments = tuple(np.float32(value) for value in (theta, theta_dot, omega))
     cases = (
-        (reojax.momentum_matrices, 1),
-        (reojax.connection, 1),
-        (reojax.angular_momentum, 3),
+        (matrices, 1),
+        (connection, 1),
+        (angular_momentum, 3),
     )
     for function, count in cases:
         exact = function(robot, *(theta, theta_dot, omega)[:count])
@@ -220,7 +223,7 @@ def test_a_batch_is_its_members():
     shapes = random_shapes(11, 2, 4)
     batch = jax.jit(jax.vmap(reojax.momentum_matrices, (None, 0)))(robot, shapes)
     for i, theta in enumerate(shapes):
-        for got, wanted in zip(batch, reojax.momentum_matrices(robot, theta), strict=True):
+        for got, wanted in zip(batch, matrices(robot, theta), strict=True):
             assert relative(got[i], np.asarray(wanted)) < 1e-14
 
 
@@ -247,6 +250,6 @@ def test_a_wrong_shape_is_named(entry, shape):
 
 def test_integer_angles_are_angles():
     robot = random_robot(13, 2)
-    got = reojax.connection(robot, jnp.array([1, 2]))
+    got = connection(robot, jnp.array([1, 2]))
     assert got.dtype == np.float64
-    assert relative(got, np.asarray(reojax.connection(robot, np.array([1.0, 2.0])))) < 1e-15
+    assert relative(got, np.asarray(connection(robot, np.array([1.0, 2.0])))) < 1e-15

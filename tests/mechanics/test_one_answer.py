@@ -57,7 +57,8 @@ def same(found: dict[str, jax.Array], expected: dict[str, np.ndarray], atol: flo
         np.testing.assert_allclose(found[name], value, rtol=1e-10, atol=atol * np.abs(value).max(), err_msg=name)
 
 
-EXPECTED = {sign: jax.tree.map(np.asarray, jax.jit(answers)(signed(sign))) for sign in (1.0, -1.0)}
+traced_answers = jax.jit(answers)
+EXPECTED = {sign: jax.tree.map(np.asarray, traced_answers(signed(sign))) for sign in (1.0, -1.0)}
 """Everything traced, nothing known."""
 
 
@@ -67,8 +68,7 @@ def test_ways_to_write_a_robot(way, sign):
     robot = way(signed(sign))
     fine = {"net_rotation": reojax.net_rotation(robot, PATH), "connection": reojax.connection(robot, THETA)}
     same(fine, {name: EXPECTED[sign][name] for name in fine})
-    traced = jax.jit(answers)(robot)
-    same(traced, EXPECTED[sign])
+    same(traced_answers(robot), EXPECTED[sign])
 
 
 def test_the_sign_of_an_axis_matters():
