@@ -1,5 +1,8 @@
 """Every solver's result has one vocabulary, and says in words how it ended."""
 
+import re
+
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -41,6 +44,23 @@ def test_a_motion_that_is_not_resolved_is_out_of_steps():
     assert coarse.message.startswith("out of steps")
     assert float(np.asarray(chosen.error)) < 1e-8
     assert (int(chosen.status), chosen.message) == (Status.CONVERGED, "converged")
+
+
+def test_results_are_printed_as_a_line_with_figures_and_the_verdict():
+    robot = reojax.robots.prototype()
+    motion = reojax.simulate(robot, LOOP, durations=0.3, samples=2)
+    assert re.fullmatch(
+        r"9 samples over 1\.2 s, turned by 0\.\d+ rad in the end, within \S+ rad; converged", str(motion)
+    )
+    least = reojax.minimum_time(robot, LOOP, RE_MAX_17)
+    assert str(least).startswith(f"{float(least.duration):.6g} s, of the edges ")
+    assert str(least).endswith("; converged")
+    problem = Solution(np.zeros((2, 1)), np.array([3.0, 2.0]), np.zeros(2), np.zeros(2), np.ones(2, int),
+                       np.array([False, True]), 1, np.array([2, 0]))  # fmt: skip
+    assert str(problem) == "1 of 2 converged; the best: cost 2, violation 0.0e+00, slope 0.0e+00; converged"
+    printed = []
+    jax.jit(lambda error: printed.append(str(motion._replace(error=error))))(1e-9)
+    assert printed[0].startswith("Motion(time=")
 
 
 def test_a_motor_that_is_asked_too_much_is_saturated():

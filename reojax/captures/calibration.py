@@ -24,7 +24,7 @@ from jaxtyping import Float
 from reojax._internal import checks
 from reojax._internal.precision import in_double
 from reojax.captures.capture import Capture
-from reojax.captures.fit import FitProblem, State
+from reojax.captures.fit import FitProblem, FitState
 from reojax.captures.parameters import Parameter, resolve
 from reojax.optimisation.status import Status
 from reojax.robot import Robot
@@ -72,6 +72,17 @@ class Calibration(NamedTuple):
     """Whether the fit came to rest before it was out of steps."""
     steps: int
     """Evaluations of the residuals that it took."""
+
+    def __str__(self) -> str:
+        """Each number before and after the fit, with its standard deviation, and how it ended."""
+        lines = [
+            f"{name}: {before:.6g} -> {after:.6g} +- {std:.2g} {unit}".rstrip()
+            for name, before, after, std, unit in zip(
+                self.names, self.start, self.values, self.std, self.units, strict=True
+            )
+        ]
+        angles = f"RMS angle {self.rms_before:.3g} -> {self.rms:.3g} rad"
+        return "\n".join([*lines, f"{angles} in {self.steps} evaluations; {self.message}"])
 
     @property
     def value(self) -> Float[np.ndarray, " p"]:
@@ -155,7 +166,7 @@ def calibrate(
 
 
 def _report(
-    problem: FitProblem, state: State, noise: float, before: float, converged: bool, steps: int, start: np.ndarray
+    problem: FitProblem, state: FitState, noise: float, before: float, converged: bool, steps: int, start: np.ndarray
 ) -> Calibration:
     """Covariance and verdict at the end of the fit."""
     p = len(state.x)

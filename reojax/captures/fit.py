@@ -24,7 +24,7 @@ from reojax.mechanics.own_units import without_names
 from reojax.robot import Robot
 
 
-class State(NamedTuple):
+class FitState(NamedTuple):
     """Everything at one set of parameters, frame and shift."""
 
     x: np.ndarray
@@ -65,13 +65,13 @@ class FitProblem:
         if 3 * len(self.seen) <= unknowns:
             raise ValueError(f"{len(self.seen)} frames with an orientation cannot determine {unknowns} numbers.")
 
-    def fit_window(self, x: np.ndarray) -> State:
+    def fit_window(self, x: np.ndarray) -> FitState:
         """The state at the parameters `x`, frame and shift at their best."""
         turned, _ = self._orientation(x)
         state = self._state(x, align_frames(self.measured, turned[self.seen]), 0.0)
         return self.fit(state, 20, fixed=True)[0]
 
-    def fit(self, begun: State, most: int, fixed: bool = False) -> tuple[State, bool, int]:
+    def fit(self, begun: FitState, most: int, fixed: bool = False) -> tuple[FitState, bool, int]:
         """The state of least squares from `begun` on, whether it converged, and the evaluations that it took.
 
         The unknowns are the parameters by their scales (none if `fixed`), a rotation vector from the frame of `begun`,
@@ -83,12 +83,12 @@ class FitProblem:
         p = 0 if fixed else len(begun.x)
 
         @lru_cache(maxsize=2)  # residuals and derivatives are asked for at the same place
-        def state_of(unknowns: tuple[float, ...]) -> State:
+        def state_of(unknowns: tuple[float, ...]) -> FitState:
             x = begun.x if fixed else np.array(unknowns[:p]) * self.scale
             frame = Rotation.from_rotvec(unknowns[p : p + 3]).as_matrix() @ begun.frame
             return self._state(x, frame, unknowns[p + 3] if self.clock else 0.0)
 
-        def state_at(unknowns: np.ndarray) -> State:
+        def state_at(unknowns: np.ndarray) -> FitState:
             return state_of(tuple(unknowns.tolist()))
 
         def residual(unknowns: np.ndarray) -> np.ndarray:
@@ -120,7 +120,7 @@ class FitProblem:
             found = least_squares(residual, first, jacobian, (lower, upper), **rules)  # pyright: ignore[reportArgumentType]
         return state_at(found.x), bool(found.status > 0), int(found.nfev)
 
-    def blur_of(self, state: State, noise: float) -> np.ndarray:
+    def blur_of(self, state: FitState, noise: float) -> np.ndarray:
         """What `blur` is at a state."""
         return noise**2 * (state.joint_effect**2).sum(axis=(1, 2))
 
@@ -151,7 +151,7 @@ class FitProblem:
         turned = chain(np.asarray(turns)[: self.edges])
         return turned, turned[1:] @ np.asarray(effect)[: self.edges]
 
-    def _state(self, x: np.ndarray, frame: np.ndarray, offset: float) -> State:
+    def _state(self, x: np.ndarray, frame: np.ndarray, offset: float) -> FitState:
         from scipy.spatial.transform import Rotation
 
         turned, effect = self._orientation(x)
@@ -168,7 +168,7 @@ class FitProblem:
             turn = Rotation.from_matrix(turned[edge + 1] @ turned[edge].swapaxes(1, 2)).as_rotvec()
             columns.append((turn / length[:, None] @ frame.T)[..., None])
         cost = float((residual**2).sum())
-        return State(
+        return FitState(
             x=x,
             frame=frame,
             offset=offset,
@@ -180,7 +180,7 @@ class FitProblem:
             joint_effect=effect[..., p:],
         )
 
-    def push(self, state: State) -> np.ndarray:
+    def push(self, state: FitState) -> np.ndarray:
         """(unknowns, m j): how the noise of each joint angle pushes the fit's normal equations."""
         weight = np.zeros((len(self.time), 3, state.derivative.shape[-1]))
         weight[self.seen] = -state.frame.T @ state.derivative

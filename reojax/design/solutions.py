@@ -39,6 +39,13 @@ class Solutions(NamedTuple):
         """Why each start of each problem ended, in words."""
         return [list(describe(row)) for row in self.status]
 
+    def __str__(self) -> str:
+        """How many problems have an answer."""
+        problems, starts = self.converged.shape
+        return (
+            f"{problems} problems from {starts} starts each, {int(self.converged.any(1).sum())} of them with an answer"
+        )
+
     def pick(self) -> Solution:
         """The best answer of each problem, the problems in front."""
         rows = np.arange(len(self.best)), self.best

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from reojax._internal.arrays import Array
+from reojax._internal.result_text import printed_as
 from reojax.collision.constraint import with_spare
 from reojax.motion._feasibility import beyond, restore_feasibility
 from reojax.motion._transcription import Apart, Task, Transcription, UnknownBox
@@ -64,6 +65,13 @@ class Fastest(NamedTuple):
 
     message = message_of_status
     """Why the optimiser ended, in words."""
+    __str__ = printed_as(
+        lambda found: (
+            f"{float(found.duration):.6g} s, error {float(found.error):.1e} rad, beyond limits by "
+            f"{float(found.beyond):.1e} rad; {found.message}"
+        ),
+        "duration",
+    )
 
 
 class _Answer(NamedTuple):

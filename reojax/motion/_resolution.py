@@ -18,6 +18,7 @@ from jaxtyping import Float, Int
 
 from reojax import so3
 from reojax._internal.arrays import Array
+from reojax._internal.result_text import printed_as
 from reojax.optimisation.status import Status
 from reojax.robot import Robot
 
@@ -65,6 +66,18 @@ def status_by_resolution(motion: Any) -> Int[Array, ""]:
         raise ValueError("this motion has no `error`: nothing is known of its accuracy.")
     fine = jnp.where(error <= target_error(np.dtype(rotation.dtype)), Status.CONVERGED, Status.OUT_OF_STEPS)
     return jnp.where(jnp.isfinite(rotation).all() & ~jnp.isnan(error), fine, Status.NOT_FINITE)
+
+
+def _one_line(motion: Any) -> str:
+    span = f"{len(motion.time)} samples over {float(motion.time[-1]):.6g} s"
+    if motion.error is None:
+        return f"{span}; nothing is known of its accuracy"
+    turn = float(so3.angle(jnp.asarray(motion.rotation[-1])))
+    return f"{span}, turned by {turn:.6g} rad in the end, within {float(motion.error):.1e} rad; {motion.message}"
+
+
+told_by_resolution: Any = printed_as(_one_line, "time")
+"""`__str__` for classes of integrated motions."""
 
 
 def error_by_halving(fine: Float[Array, "s+1 3 3"], coarse: Float[Array, "s/2+1 3 3"], order: int) -> Float[Array, ""]:

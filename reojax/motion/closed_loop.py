@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
+from reojax._internal.result_text import printed_as
 from reojax.mechanics.dynamics import joint_load
 from reojax.mechanics.integrators import RK4, runge_kutta_step
 from reojax.mechanics.own_units import without_names
@@ -92,6 +93,13 @@ class Tracking(NamedTuple):
     """Whether the motors gave all that was asked for, and all numbers are finite."""
     message = message_of_status
     """How it ended, in words."""
+    __str__ = printed_as(
+        lambda run: (
+            f"{len(run.time)} samples over {float(run.time[-1]):.6g} s, off the plan by "
+            f"{float(run.cost):.3g} rad RMS and {float(run.error):.3g} rad at the end; {run.message}"
+        ),
+        "time",
+    )
 
 
 def track(

@@ -19,6 +19,7 @@ from jaxtyping import Bool, Float, Int
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array, common_float, is_concrete
+from reojax._internal.result_text import printed_as
 from reojax.collision.refusal import require_clearance
 from reojax.mechanics.dynamics import joint_load
 from reojax.mechanics.own_units import without_names
@@ -88,6 +89,13 @@ class LeastTime(NamedTuple):
 
     message = message_of_status
     """How it ended, in words."""
+    __str__ = printed_as(
+        lambda found: (
+            f"{float(found.duration):.6g} s, of the edges "
+            f"{', '.join(f'{float(each):.6g}' for each in found.durations)} s; {found.message}"
+        ),
+        "duration",
+    )
 
 
 def minimum_time(

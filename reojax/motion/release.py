@@ -38,6 +38,7 @@ from reojax.motion._resolution import (
     start_count,
     status_by_resolution,
     target_error,
+    told_by_resolution,
 )
 from reojax.motion.trajectory import Trajectory, polynomial
 from reojax.optimisation.status import converged_by_status, message_of_status
@@ -82,6 +83,7 @@ class Released(NamedTuple):
     """Whether `error` is below 1e-8 rad (1e-4 in float32)."""
     message = message_of_status
     """How it ended, in words."""
+    __str__ = told_by_resolution
 
 
 def released(

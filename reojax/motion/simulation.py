@@ -36,6 +36,7 @@ from reojax.motion._resolution import (
     start_count,
     status_by_resolution,
     target_error,
+    told_by_resolution,
 )
 from reojax.motion.motor import Motor, check_motors, drive, per_joint
 from reojax.motion.time_laws import Law
@@ -90,6 +91,7 @@ class Motion(NamedTuple):
     """Whether `error` is below 1e-8 rad (1e-4 in float32)."""
     message = message_of_status
     """How it ended, in words."""
+    __str__ = told_by_resolution
 
 
 def simulate(

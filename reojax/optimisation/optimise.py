@@ -61,6 +61,12 @@ class Solution(NamedTuple):
         """Why each start ended, in words."""
         return list(describe(self.status))
 
+    def __str__(self) -> str:
+        """How many starts have converged, and the best."""
+        best, count = self.best, len(self.converged)
+        figures = f"cost {self.cost[best]:.6g}, violation {self.residual[best]:.1e}, slope {self.slope[best]:.1e}"
+        return f"{int(self.converged.sum())} of {count} converged; the best: {figures}; {self.message[best]}"
+
 
 def optimise(
     cost: Function,

@@ -26,7 +26,7 @@ _EXACT = 1e-10
 """Largest violation of a row that an answer may have."""
 
 
-class Step(NamedTuple):
+class QuadraticStep(NamedTuple):
     """Answer of one quadratic program."""
 
     d: Float[np.ndarray, " n"]
@@ -46,7 +46,7 @@ def solve_quadratic(
     equalities: int,
     low: Float[np.ndarray, " n"],
     high: Float[np.ndarray, " n"],
-) -> Step:
+) -> QuadraticStep:
     """Solve the program above; the first `equalities` rows must be zero, the others not positive.
 
     Variables with `low == high` are held; `low` and `high` may be infinite.
@@ -76,7 +76,7 @@ def _solve(
     equalities: int,
     low: np.ndarray,
     high: np.ndarray,
-) -> Step:
+) -> QuadraticStep:
     import daqp  # not needed before something is optimised
 
     n, last = len(gradient), len(gradient) + equalities
@@ -89,9 +89,9 @@ def _solve(
     sense[n:last] = _EQUALITY
     d, _, flag, info = daqp.solve(hessian, gradient, rows, above, below, sense, primal_tol=_EXACT)
     if flag == _SOLVED:
-        return Step(d, info["lam"][n:], True, True)
+        return QuadraticStep(d, info["lam"][n:], True, True)
     sense[n:] = _SOFT
     d, _, flag, info = daqp.solve(
         hessian, gradient, rows, above, below, sense, primal_tol=_EXACT, rho_soft=SOFTNESS, w_soft=0.0
     )
-    return Step(d, info["lam"][n:], False, flag in (_SOLVED, _SOLVED_SOFT) and bool(np.isfinite(d).all()))
+    return QuadraticStep(d, info["lam"][n:], False, flag in (_SOLVED, _SOLVED_SOFT) and bool(np.isfinite(d).all()))

@@ -37,7 +37,7 @@ from reojax.optimisation.iterates import (
 )
 from reojax.optimisation.line_search import SUFFICIENT, search
 from reojax.optimisation.merit import largest_violation, merit, predict
-from reojax.optimisation.quadratic import Step, solve_quadratic
+from reojax.optimisation.quadratic import QuadraticStep, solve_quadratic
 from reojax.optimisation.status import Status
 
 RESTARTS, ASIDE = 3, 0.3
@@ -166,7 +166,7 @@ def _solve(problem: ScaledProblem, run: Iterates, who: np.ndarray) -> None:
         _move_aside(problem, run, i)
 
 
-def _program(run: Iterates, i: int, below: np.ndarray, above: np.ndarray) -> Step:
+def _program(run: Iterates, i: int, below: np.ndarray, above: np.ndarray) -> QuadraticStep:
     return solve_quadratic(run.hessian[i], run.gradient[i], run.jacobian[i], run.c[i], run.equalities, below, above)
 
 

@@ -25,7 +25,7 @@ Columns = tuple[Any, ...]
 """Components of something that every link has, (n, nodes) each."""
 
 
-class Motion(NamedTuple):
+class JointMotion(NamedTuple):
     """Angles and rates of all joints at all nodes, (j, nodes) each."""
 
     sine: jax.Array
@@ -52,13 +52,13 @@ def unflatten(numbers: jax.Array, joints: int) -> Parameters:
     return Parameters(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)))
 
 
-def motion_at_nodes(points: jax.Array, steps: int) -> Motion:
+def motion_at_nodes(points: jax.Array, steps: int) -> JointMotion:
     """`path_nodes` and the angles' sine and cosine, for all joints at once."""
     rate = (points[1:] - points[:-1]).T[:, :, None] / steps
     start = points[:-1].T[:, :, None] + rate * jnp.arange(steps, dtype=points.dtype)[None, None, :]
     theta = start[..., None] + rate[..., None] * jnp.asarray(NODES, points.dtype)[None, None, None, :]
     rates = jnp.broadcast_to(rate[..., None], theta.shape)
-    return Motion(*(x.reshape(points.shape[1], -1) for x in (*sincos(theta), rates)))
+    return JointMotion(*(x.reshape(points.shape[1], -1) for x in (*sincos(theta), rates)))
 
 
 def to_points(theta: jax.Array, rate: jax.Array, steps: int) -> jax.Array:
@@ -70,7 +70,7 @@ def to_points(theta: jax.Array, rate: jax.Array, steps: int) -> jax.Array:
     return (jnp.pad(ends[..., 0], ((0, 0), (0, 1))) + jnp.pad(ends[..., 1], ((0, 0), (1, 0)))).T
 
 
-def inward(robot: Parameters, parent: tuple[int, ...], motion: Motion) -> Base:
+def inward(robot: Parameters, parent: tuple[int, ...], motion: JointMotion) -> Base:
     """`recursion.inward`."""
     # push, spin, moment, inertia of each link alone: one array (links, nodes) for each component
     nodes = motion.rate.shape[1]
@@ -94,7 +94,7 @@ def _subtree(mass: Any, columns: Columns) -> Subtree:
 
 
 def angular_momentum(
-    robot: Parameters, parent: tuple[int, ...], motion: Motion, omega: Vector, velocity: Vector, centre: Vector
+    robot: Parameters, parent: tuple[int, ...], motion: JointMotion, omega: Vector, velocity: Vector, centre: Vector
 ) -> Vector:
     """`momentum_jvp.angular_momentum`."""
     # outward, then each link alone, then inward
@@ -117,7 +117,7 @@ def angular_momentum(
 def slopes(
     robot: Parameters,
     parent: tuple[int, ...],
-    motion: Motion,
+    motion: JointMotion,
     omega: Vector,
     velocity: Vector,
     centre: Vector,
@@ -170,7 +170,7 @@ def slopes(
     return RolledSlopes(of, theta, rate)
 
 
-def _outward(robot: Parameters, parent: tuple[int, ...], motion: Motion, base: Vector, *, moving: bool) -> Columns:
+def _outward(robot: Parameters, parent: tuple[int, ...], motion: JointMotion, base: Vector, *, moving: bool) -> Columns:
     """Angular velocity and velocity of the origin of every link, its own frame; with the joints at rest or `moving`."""
     first = tuple(
         jnp.zeros((len(parent) + 1, motion.rate.shape[1]), motion.rate.dtype).at[0].set(component) for component in base
