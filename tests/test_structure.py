@@ -62,6 +62,18 @@ def test_few_files_lie_beside_the_packages():
     assert len([file for file in PACKAGE.glob("*.py")]) <= 8
 
 
+def test_the_page_on_architecture_shows_the_packages_and_files_that_there_are():
+    page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    tree = page[page.index("reojax/\n") : page.index("## Where is")]
+    assert {f.name for f in PACKAGE.iterdir() if (f / "__init__.py").exists()} == set(
+        re.findall(r"^  (\w+)/", tree, re.M)
+    )
+    looked_for = page[page.index("## Where is") : page.index("## One number")]
+    files = re.findall(r"`([\w/]+\.py)`", looked_for)
+    assert len(files) > 10
+    assert not [file for file in files if not (PACKAGE / file).is_file()]
+
+
 def test_no_function_hides_a_package():
     """`reojax.sweeps.merge`, and not an AttributeError of a function `sweep`."""
     for folder in (f for f in PACKAGE.iterdir() if (f / "__init__.py").exists() and not f.name.startswith("_")):
