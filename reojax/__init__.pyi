@@ -39,6 +39,7 @@ from reojax.motion.time_laws import Law, minimum_jerk, quintic, trapezoid
 from reojax.motion.trajectory import Trajectory, along, through
 from reojax.motion.trajectory_clearance import TrajectoryClearance, trajectory_clearance
 from reojax.path import Path, joint_travel, polygon
+from reojax.planning.farthest_turn import farthest_turn
 from reojax.planning.free_path import FreePaths, free_path, free_paths
 from reojax.planning.plan import plan, plan_many, replan
 from reojax.planning.plan_file import SavedPlan, load_plan, save_plan
@@ -83,6 +84,7 @@ __all__ = [
     "CorrectionGains",
     "curvature",
     "design",
+    "farthest_turn",
     "Fastest",
     "fastest_loop",
     "forward_dynamics",

@@ -241,7 +241,7 @@ def _solve(
     clear: Clear | None,
 ) -> FreePaths:
     count = len(freedom.joints)
-    corners = corners or next(number for most, number in _CORNERS if count <= most)
+    corners = corners or corners_for(count)
     polygons = polygons_of(robot, freedom, corners)
     table = table_of(polygons, freedom, key_of(robot), seed)
     reach = reach_of(robot, freedom, polygons, table.turns)
@@ -285,6 +285,11 @@ def _solve(
         status=np.array([_status(*row, tolerance, reach) for row in zip(error, beyond, kept, strict=True)]),
         clearance=proven,
     )
+
+
+def corners_for(joints: int) -> int:
+    """Free corners by default, of paths on which so many joints move."""
+    return next(number for most, number in _CORNERS if joints <= most)
 
 
 def _clear_again(search: Search, x: np.ndarray, runs: np.ndarray, targets: np.ndarray, moving: np.ndarray) -> None:

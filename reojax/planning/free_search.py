@@ -91,6 +91,11 @@ class Search:
         exact = np.maximum(np.minimum(_MISS, 0.05 * self.tolerance / runs), 1e-14)
         return self._improve(self._first(targets, exact, hints), targets, exact, self.tolerance / runs)
 
+    def onto(self, x: np.ndarray, targets: np.ndarray) -> np.ndarray:
+        """Polygons (m, n) brought onto targets (m, 3, 3) from where they are, or as near as can be."""
+        tolerance = np.full(len(x), self.tolerance)
+        return self._improve(x[:, None], targets, np.clip(0.05 * tolerance, 1e-14, _MISS), tolerance)
+
     def farthest(self, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Polygons (m, h, n) that turn the base about axes (m, 3) as far as can be found, and how far (m,)."""
         x = np.array([self.table.farthest(axis, self.starts) for axis in axes])

@@ -45,14 +45,19 @@ class PolygonTable(NamedTuple):
 
     def farthest(self, axis: Float[np.ndarray, "3"], count: int) -> Float[np.ndarray, "c n"]:
         """Those which turn most about an axis and little otherwise, with that turn as their last variable."""
+        best = self.farthest_rows(axis, count)
+        x = self.x[best].copy()
+        along = axis @ (np.where(self.turns[0] < 0, -1, 1) * self.turns[1:])[:, best]
+        x[:, -1] = 2 * np.arcsin(np.clip(along, 1e-12, 1.0))
+        return x
+
+    def farthest_rows(self, axis: Float[np.ndarray, "3"], count: int) -> np.ndarray:
+        """Their rows, the most promising first, of either kind in turn."""
         half = np.where(self.turns[0] < 0, -1, 1) * self.turns[1:]
         along = axis @ half
         across = np.sqrt(((half - along * axis[:, None]) ** 2).sum(0))
         order = np.argsort((across - along).reshape(2, -1), axis=1) + [[0], [self.x.shape[0] // 2]]
-        best = order.T.ravel()[:count]
-        x = self.x[best].copy()
-        x[:, -1] = 2 * np.arcsin(np.clip(along[best], 1e-12, 1.0))
-        return x
+        return order.T.ravel()[:count]
 
 
 _tables: Store[PolygonTable] = Store(_KEPT)
