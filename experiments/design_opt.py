@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 from common.motors import motors_of
-from common.script import options, run
+from common.script import length, options, run
 from common.tables import gradient_error, least_travel, summary, table
 from design_opt_parts import any_robot, constrained
 from design_opt_parts.manoeuvre_a import INERTIA, RATIO, joint_travel, manoeuvre_problem
@@ -238,14 +238,6 @@ def _picture(loops: list[dict[str, Any]], curves: dict[str, dict[str, Any]], tar
     return figure
 
 
-def _length(text: str) -> float:
-    """Metres, of a length such as `5mm`; a bare number is in mm."""
-    for unit, size in (("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("", 1e-3)):
-        if text.endswith(unit):
-            return size * float(text.removesuffix(unit))
-    raise AssertionError(text)
-
-
 def _line(text: str) -> tuple[float, float]:
     """Torque and speed, of `39,1.4`."""
     torque, speed = map(float, text.split(","))
@@ -257,7 +249,7 @@ if __name__ == "__main__":
     parser.add_argument("--target", type=float, default=180.0, help="turn to reach [deg] (default: 180)")
     parser.add_argument("--axis", choices=("x", "y", "z"), default="z", help="axis of the turn (default: z, the roll)")
     parser.add_argument(
-        "--clearance", type=_length, metavar="LENGTH", help="what the robot's parts keep apart, such as 5mm"
+        "--clearance", type=length, metavar="LENGTH", help="what the robot's parts keep apart, such as 5mm"
     )
     parser.add_argument("--robot", default="prototype", help="a robot's name, or a file (default: prototype)")
     parser.add_argument(

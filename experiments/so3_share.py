@@ -2,6 +2,7 @@
 
     python experiments/so3_share.py            # a minute on 2 cores
     python experiments/so3_share.py --quick    # fewer targets, up to 2 manoeuvres, no rectangles
+    python experiments/so3_share.py --clearance 5mm      # what is left once the robot may not touch itself; minutes
 
 Uniformly random targets (Haar), twist within 270 degrees and bend within 120; words of A and B, and words of
 rectangles whose distal joints have amplitudes of their own. A share is that of targets whose plan has so many
@@ -9,13 +10,17 @@ manoeuvres or fewer. "Not with fewer" is a numerical decision, so a share is a l
 tried on targets made of n random manoeuvres, all amplitudes and letters uniform: the share not solved with n.
 That is not the share of all orientations wrongly refused, whose words are others.
 
-Expected: 0 with one A or B, as their rotations are surfaces in SO(3); more with rectangles; practically all with 5.
+With `--clearance` 1000 targets are asked for with and without it, by words of A and B; each number of manoeuvres by
+itself, as a search that may take more of them gives fewer up sooner. That row is without the wrongly given up.
+
+Expected: 0 with one A or B, as their rotations are surfaces in SO(3); more with rectangles; practically all with 5,
+and with 6 of them clear of the robot itself.
 """
 
 from pathlib import Path
 
 import numpy as np
-from common.script import options, run
+from common.script import length, options, run
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
@@ -36,6 +41,26 @@ def share(hits: np.ndarray) -> dict:
     return {"share": p, "standard_error": float(np.sqrt(p * (1 - p) / len(hits)))}
 
 
+def random_targets(count: int) -> np.ndarray:
+    """Uniformly random rotations (count, 3, 3)."""
+    return Rotation.from_quat(np.random.default_rng(0).normal(size=(count, 4))).as_matrix()
+
+
+def shares_reached(targets: np.ndarray, most: int, clearance: float | None) -> list[float]:
+    """Shares of targets reached with at most 1, 2, ... `most` manoeuvres of A and B that keep a clearance [m].
+
+    Each number is asked for by itself.
+    """
+    reached, shares = np.full(len(targets), False), []
+    for number in range(1, most + 1):
+        left = np.flatnonzero(~reached)
+        if len(left):
+            found = reojax.plan_many(ROBOT, targets[left], **LIMITS, max_manoeuvres=number, clearance=clearance)
+            reached[left] = found.converged
+        shares.append(float(reached.mean()))
+    return shares
+
+
 def planted(vocabulary: str, manoeuvres: int, count: int, rng: np.random.Generator) -> np.ndarray:
     """Rotations (count, 3, 3) after words of so many random manoeuvres."""
     x = rng.uniform(-1, 1, (3, manoeuvres * count))
@@ -51,7 +76,7 @@ def planted(vocabulary: str, manoeuvres: int, count: int, rng: np.random.Generat
 
 def measure(vocabulary: str, most: int, count: int, planted_count: int) -> dict:
     """Shares by number of manoeuvres, and how often the number is given up wrongly."""
-    targets = Rotation.from_quat(np.random.default_rng(0).normal(size=(count, 4))).as_matrix()
+    targets = random_targets(count)
     plan = reojax.plan_many(ROBOT, targets, **LIMITS, max_manoeuvres=most, vocabulary=vocabulary, progress=True)
     reached = [{"at_most": n, **share(plan.converged & (plan.manoeuvres <= n))} for n in range(1, most + 1)]
     rng, given_up = np.random.default_rng(1), []
@@ -65,8 +90,10 @@ def measure(vocabulary: str, most: int, count: int, planted_count: int) -> dict:
             "planted_targets_each": planted_count, "planted_not_solved": given_up}  # fmt: skip
 
 
-def main(out: Path, *, quick: bool = False) -> dict:
+def main(out: Path, *, quick: bool = False, clearance: float | None = None) -> dict:
     """Plan, print the table, write `so3_share.json` and `so3_share.png` to `out`, and return the numbers."""
+    if clearance is not None:
+        return _with_clearance(out, clearance, quick=quick)
     table, picture = check_writable(out / "so3_share.json"), check_writable(out / "so3_share.png")
     cases = (("manoeuvres", 2, 64, 16),) if quick else (("manoeuvres", 5, 2_000, 1_000), ("rectangles", 5, 500, 250))
     rows = []
@@ -80,6 +107,23 @@ def main(out: Path, *, quick: bool = False) -> dict:
             cells = (f"{100 * s['share']:.2f} +- {100 * s['standard_error']:.2f}" for s in shares)
             print(f"{NAMES[row['vocabulary']]:12}{count:8}  " + "".join(f"{cell:>16}" for cell in cells) + f"  {what}")
     _draw(rows).savefig(picture, dpi=150)
+    return {"rows": rows}
+
+
+def _with_clearance(out: Path, clearance: float, *, quick: bool) -> dict:
+    """Shares with and without a clearance, to `so3_share_clear.json`."""
+    record = check_writable(out / "so3_share_clear.json")
+    targets, most = random_targets(32 if quick else 1000), 2 if quick else 6
+    rows = []
+    print(f"share [%] of {len(targets)} random targets reached with at most n manoeuvres of A and B")
+    print(f"{'':14}" + "".join(f"{f'n = {n}':>9}" for n in range(1, most + 1)))
+    for margin in (None, clearance):
+        shares = shares_reached(targets, most, margin)
+        rows.append({"clearance_m": margin, "targets": len(targets), "reached": shares})
+        name = "may touch" if margin is None else f"{1e3 * margin:g} mm clear"
+        print(f"{name:14}" + "".join(f"{100 * value:9.1f}" for value in shares), flush=True)
+        write_json(record, {"rows": rows})
+    print(f"wrote {record}")
     return {"rows": rows}
 
 
@@ -118,4 +162,6 @@ def _draw(rows: list[dict]) -> Figure:
 
 
 if __name__ == "__main__":
-    run(main, options(__doc__))
+    parser = options(__doc__)
+    parser.add_argument("--clearance", type=length, metavar="LENGTH", help="what the parts keep apart, such as 5mm")
+    run(main, parser)

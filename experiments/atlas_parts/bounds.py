@@ -29,8 +29,7 @@ from common.markdown import table
 
 import reojax
 from atlas_parts.store import Row, Store
-from atlas_parts.subjects import Subject
-from reojax.planning.freedom import freedom_of
+from atlas_parts.subjects import Subject, box_of
 
 _BATCH = 512
 _NEAR = 24
@@ -111,8 +110,7 @@ def least_travel(angle: float, largest: Largest) -> float:
 
 def bound_of(subject: Subject, turns: Row, *, quick: bool = False) -> Row:
     """Lower bounds for the turns of question 1, and the gaps of the travels found to them."""
-    freedom = freedom_of(subject.robot, start=subject.start, end=None, joints=None, lower=None, upper=None)
-    largest = largest_curvature(subject.robot, freedom.low, freedom.high, postures=2048 if quick else 16384)
+    largest = largest_curvature(subject.robot, *box_of(subject), postures=2048 if quick else 16384)
     rows = {}
     for name, row in turns["turns"].items():
         least = least_travel(np.deg2rad(float(name.split()[1])), largest)

@@ -19,7 +19,7 @@ _PREFERRED = ("roll 90", "yaw 90", "pitch 90", "roll 180", "yaw 180")
 
 def jobs(subjects: list[Subject], store: Store, quick: bool) -> list[tuple[str, Callable[[], Row]]]:
     """A row for each robot that question 1 turns."""
-    turned = store.under("turns")
+    turned = {} if quick else store.under("turns")
     return [
         (s.name, lambda s=s: _row(s, turned[s.name])) for s in subjects if s.name in turned and _turn(turned[s.name])
     ]

@@ -139,3 +139,13 @@ def subject(name: str) -> Subject:
     axes = {axis: np.array(vector) for axis, vector in entry.axes.items()}
     motors = entry.motors if isinstance(entry.motors, Motor) else motors_of(robot, *entry.motors)
     return Subject(name, robot, start, axes, margin, motors)
+
+
+def box_of(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest and largest angles (j,) that its joints take on the way [rad].
+
+    Its limits; half a turn from the posture at rest where there are none, a turn at most.
+    """
+    start, lower, upper = subject.start, np.asarray(subject.robot.lower), np.asarray(subject.robot.upper)
+    half = np.where(np.isfinite(upper - lower), 2 * np.pi, np.pi)
+    return np.maximum(lower, start - half), np.minimum(upper, start + half)

@@ -12,7 +12,7 @@ from common.proof import prove
 from common.tables import least_travel
 from design_opt import best_loops
 from matplotlib.figure import Figure
-from scipy.spatial.transform import Rotation
+from so3_share import random_targets, shares_reached
 
 import reojax
 from atlas_parts.store import Row, Store
@@ -50,22 +50,10 @@ def jobs(subjects: list[Subject], store: Store, quick: bool) -> list[tuple[str, 
 
 
 def share(count: int) -> Row:
-    """Share of uniformly random targets reached with at most n manoeuvres, with clearance and without.
-
-    Each number is asked for by itself: a search that may take more gives fewer up sooner.
-    """
-    targets = Rotation.from_quat(np.random.default_rng(0).normal(size=(count, 4))).as_matrix()
-    row: Row = {"targets": count}
-    for name, margin in (("without", None), ("5 mm", CLEARANCE)):
-        reached, shares = np.full(count, False), []
-        for most in range(1, 7):
-            left = np.flatnonzero(~reached)
-            if len(left):
-                found = reojax.plan_many(ROBOT, targets[left], **LIMITS, max_manoeuvres=most, clearance=margin)
-                reached[left] = found.converged
-            shares.append(float(reached.mean()))
-        row[name] = shares
-    return row
+    """Share of uniformly random targets reached with at most n manoeuvres, with clearance and without."""
+    targets = random_targets(count)
+    shares = {name: shares_reached(targets, 6, margin) for name, margin in (("without", None), ("5 mm", CLEARANCE))}
+    return {"targets": count, **shares}
 
 
 def half_turn(margin: float | None) -> Row:

@@ -1,6 +1,6 @@
 """Question 1: what turns a robot about roll, pitch and yaw, how far one loop goes, and what a turn costs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +9,10 @@ from common.markdown import table
 from common.proof import prove
 
 import reojax
+from atlas_parts import animations
 from atlas_parts.clear_turns import Effort, Turns, boxed_turns, clear_turns, free_turns
 from atlas_parts.store import Row, Store
-from atlas_parts.subjects import USUAL_AXES, Subject, subject
+from atlas_parts.subjects import USUAL_AXES, Subject
 from reojax import so3
 
 AXES = tuple(USUAL_AXES)
@@ -29,12 +30,14 @@ def turns(subject: Subject, *, quick: bool = False) -> Row:
     """One robot's row: rank at rest, and per axis the farthest loop and the turns with their certificates."""
     effort = QUICK if quick else THOROUGH if subject.robot.joints <= FEW else USUAL
     rank = reojax.controllable_directions(subject.robot, subject.start)
-    wanted = [(axis, angle) for axis in subject.axes for angle in (ANGLES[1:] if quick else ANGLES)]
+    axes = [next(iter(subject.axes))] if quick else subject.axes
+    wanted = [(axis, angle) for axis in axes for angle in (ANGLES[1:] if quick else ANGLES)]
     targets = np.array([np.asarray(so3.exp(np.deg2rad(angle) * subject.axes[axis])) for axis, angle in wanted])
     if subject.robot.joints <= FEW and not quick:
-        touching, found = free_turns(subject, targets, effort), clear_turns(subject, targets, effort)
+        touching = free_turns(subject, targets, effort)
+        found = clear_turns(subject, targets, effort, touching)
     else:
-        found, touching = boxed_turns(subject, targets, effort, most=2 if quick else None)
+        found, touching = boxed_turns(subject, targets, effort, most=1 if quick else None)
     alone = Turns(*(part.copy() for part in found))
     for answers in (touching, found):
         _double(answers, wanted)
@@ -44,11 +47,11 @@ def turns(subject: Subject, *, quick: bool = False) -> Row:
         "axes": rank.axes.tolist(),
         "clearance_m": subject.clearance,
         "pairs": len(subject.robot.collision_pairs),
-        "turns": {f"{axis} {angle}": _turn(subject, found, touching, targets, k)
+        "turns": {f"{axis} {angle}": _turn(subject, found, touching, targets, k, LAWS[:1] if quick else LAWS)
                   for k, (axis, angle) in enumerate(wanted)},
     }  # fmt: skip
-    row["most"] = {axis: _most(axis, alone, wanted) for axis in subject.axes}
-    row["farthest"] = {axis: found.farthest[wanted.index((axis, ANGLES[-1]))].tolist() for axis in subject.axes}
+    row["most"] = {axis: _most(axis, alone, wanted) for axis in axes}
+    row["farthest"] = {axis: found.farthest[wanted.index((axis, ANGLES[-1]))].tolist() for axis in axes}
     return row
 
 
@@ -63,7 +66,9 @@ def _double(found: Turns, wanted: list[tuple[str, int]]) -> None:
             found.runs[k], found.travel[k] = 2 * found.runs[half], 2 * found.travel[half]
 
 
-def _turn(subject: Subject, found: Turns, without: Turns, targets: np.ndarray, k: int) -> Row:
+def _turn(
+    subject: Subject, found: Turns, without: Turns, targets: np.ndarray, k: int, laws: Sequence[str] = LAWS
+) -> Row:
     """Cost and certificate of one turn; without a clearance it is given for what it would cost."""
     row: dict[str, Any] = {
         "reached": bool(found.reached[k]),
@@ -77,7 +82,7 @@ def _turn(subject: Subject, found: Turns, without: Turns, targets: np.ndarray, k
     if not found.reached[k]:
         return row
     path, runs = found.waypoints[k], int(found.runs[k])
-    seconds, law = least_time(subject, path)
+    seconds, law = least_time(subject, path, laws)
     return row | {
         "runs": runs,
         "travel_deg": float(np.rad2deg(found.travel[k])),
@@ -88,10 +93,10 @@ def _turn(subject: Subject, found: Turns, without: Turns, targets: np.ndarray, k
     }
 
 
-def least_time(subject: Subject, path: np.ndarray) -> tuple[float, str]:
+def least_time(subject: Subject, path: np.ndarray, laws: Sequence[str] = LAWS) -> tuple[float, str]:
     """Least time of one run [s] by the faster of the laws, each edge from rest to rest."""
     loop = reojax.polygon(path)
-    return min((float(reojax.minimum_time(subject.robot, loop, subject.motors, law).duration), law) for law in LAWS)
+    return min((float(reojax.minimum_time(subject.robot, loop, subject.motors, law).duration), law) for law in laws)
 
 
 def _most(axis: str, found: Turns, wanted: list[tuple[str, int]]) -> float:
@@ -111,7 +116,7 @@ def show(rows: dict[str, Row], out: Path) -> None:
     columns = ["robot", "joints", "rank", "kept clear [mm]", *(f"one loop, {axis} [deg]" for axis in AXES), "CPU s"]
     print(table(columns, [
         [name, row["joints"], row["rank"], f"{1e3 * row['clearance_m']:.1f}",
-         *(f"{row['most'][axis]:.3g}" for axis in AXES), f"{row['cpu_s']:.0f}"]
+         *(f"{row['most'][axis]:.3g}" if axis in row["most"] else "" for axis in AXES), f"{row['cpu_s']:.0f}"]
         for name, row in rows.items()
     ]))  # fmt: skip
     for angle in ANGLES[::-1]:
@@ -127,7 +132,7 @@ def show(rows: dict[str, Row], out: Path) -> None:
         print(f"{figure}: largest of {len(values)} {max(values, default=0.0):.1e}")
     print(f"certificates that hold: {sum(c['holds'] for c in certificates)} of {len(certificates)}\n")
     for name, row in rows.items():
-        _animate(name, row, out)
+        animations.write(name, row, out / "atlas")
 
 
 def _cell(turn: Row | None) -> str:
@@ -142,23 +147,3 @@ def _cell(turn: Row | None) -> str:
         return f"not found {free}"
     runs = f"{turn['runs']} runs, " if turn["runs"] > 1 else ""
     return f"{runs}{turn['travel_deg']:.0f} {free}, {turn['time_s']:.2g} s"
-
-
-def _animate(name: str, row: Row, out: Path) -> None:
-    """The robot's largest turn that was found, one run of it, as a page for a browser."""
-    reached = {turn: found for turn, found in row["turns"].items() if found["reached"]}
-    if not reached:
-        return
-    turn = max(reached, key=lambda turn: float(turn.split()[1]) / reached[turn]["runs"])
-    found, one = reached[turn], subject(name)
-    axis, angle = turn.split()
-    target = so3.exp(np.deg2rad(float(angle)) / found["runs"] * one.axes[axis])
-    rows = {
-        "joint travel of all runs": f"{found['travel_deg']:.0f} deg",
-        "least time of all runs": f"{found['time_s']:.3g} s",
-        "clearance, proven": f"{1e3 * (found['certificate']['clearance_m'] or 0):.1f} mm",
-    }
-    runs = f", one of {found['runs']} runs" if found["runs"] > 1 else ""
-    page = out / f"atlas_{name.replace(' ', '_')}.html"
-    reojax.view(one.robot, reojax.polygon(np.array(found["waypoints"])), page, target=np.asarray(target), rows=rows,
-                title=f"{name}: {angle}° of {axis}{runs}")  # fmt: skip

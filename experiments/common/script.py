@@ -39,6 +39,14 @@ def run(main: Callable[..., dict], parser: argparse.ArgumentParser) -> None:
     sys.exit(0 if answer.get("converged", True) else 1)
 
 
+def length(text: str) -> float:
+    """Metres, of a length such as `5mm`; a bare number is in mm."""
+    for unit, size in (("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("", 1e-3)):
+        if text.endswith(unit):
+            return size * float(text.removesuffix(unit))
+    raise AssertionError(text)
+
+
 def _make_folder(out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -19,7 +19,7 @@ import reojax
 from design_opt_parts.in_time import SLOPE, in_time, least_time, times_of, total
 from reojax import Motor, design, robots, so3
 from reojax.design import Loops, Problem, Solution, Variable
-from reojax.design.problem import Measure
+from reojax.design.outcome import Measure
 
 ENDS, GEARS = (0.5, 2.0), (0.5, 2.0)
 """Inertia of the end links about their joints, and gear ratios, over those of the robot as it is."""

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import reojax
 from reojax import Motor
 from reojax.design import Outcome, Variable
-from reojax.design.problem import Measure
+from reojax.design.outcome import Measure
 
 SLOPE = 1e-4
 """Slope at which a search with motors ends."""

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from atlas_parts import bounds, motors
+from atlas_parts import animations, bounds, clear_turns, motors, subjects
 from atlas_parts.store import Store
 from common import proof
 
@@ -90,3 +90,27 @@ def test_the_bound_is_close_where_curvature_is_even():
 def test_the_verdicts_of_figure_3_2(seconds, expected):
     assert motors.verdicts_hold(seconds) is expected
     assert (motors.LEAST < seconds <= motors.SLOWEST) is expected
+
+
+def test_pages_share_what_they_have_in_common(tmp_path):
+    """Put together again a page is the one that `view` wrote."""
+    page = reojax.view(ROBOT, reojax.polygon(PATH), tmp_path / "turn.html", certificate=False)
+    whole = page.read_text("utf-8")
+    animations.share(page)
+    text, shared = page.read_text("utf-8"), (tmp_path / animations.SHARED).read_text("utf-8")
+    assert text.replace(f'<script src="{animations.SHARED}"></script>', f"<script>{shared}</script>") == whole
+    assert len(text) < 0.3 * len(whole)
+
+
+@pytest.mark.slow
+def test_a_search_with_few_pairs_is_proven_with_all():
+    """A quarter turn of roll, asked for with a clearance: the certificate, measured from outside, holds."""
+    one = subjects.subject("prototype")
+    target = np.asarray(so3.exp(0.25 * np.pi * one.axes["roll"]))[None]
+    effort = clear_turns.Effort(starts=1, steps=25)
+    free = clear_turns.free_turns(one, target, effort)
+    found = clear_turns.clear_turns(one, target, effort, free)
+    assert free.reached.all()
+    assert found.reached.all()
+    assert proof.prove(one.robot, found.waypoints[0], int(found.runs[0]), target[0], one.clearance)["holds"]
+    assert found.most[0] >= np.pi / 4

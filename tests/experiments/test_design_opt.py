@@ -3,6 +3,7 @@
 import design_opt
 import numpy as np
 import pytest
+from common.script import length
 from design_opt_parts import any_robot, in_time
 
 import reojax
@@ -73,7 +74,7 @@ def test_edges_that_take_what_their_joints_need_are_just_in_time():
 
 @pytest.mark.parametrize(("text", "metres"), [("5mm", 0.005), ("5", 0.005), ("2cm", 0.02), ("0.1m", 0.1)])
 def test_a_clearance_has_a_unit(text, metres):
-    assert design_opt._length(text) == pytest.approx(metres)
+    assert length(text) == pytest.approx(metres)
 
 
 def test_the_command_answers_for_a_robot_of_a_file(tmp_path):

@@ -1,0 +1,46 @@
+"""Each robot's farthest turn that was found as a page for a browser; what all pages have in common lies beside them."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+import reojax
+from atlas_parts.store import Row
+from atlas_parts.subjects import subject
+from reojax import so3
+
+SHARED = "three.js"
+"""The library that draws, six parts in seven of a page by itself."""
+_SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
+
+
+def write(name: str, row: Row, folder: Path) -> Path | None:
+    """Write the page of one run of a robot's farthest turn, and the shared library; None where nothing was found."""
+    reached = {turn: found for turn, found in row["turns"].items() if found["reached"]}
+    if not reached:
+        return None
+    turn = max(reached, key=lambda turn: float(turn.split()[1]) / reached[turn]["runs"])
+    found, one = reached[turn], subject(name)
+    axis, angle = turn.split()
+    target = so3.exp(np.deg2rad(float(angle)) / found["runs"] * one.axes[axis])
+    rows = {
+        "joint travel of all runs": f"{found['travel_deg']:.0f} deg",
+        "least time of all runs": f"{found['time_s']:.3g} s",
+        "clearance, proven": f"{1e3 * (found['certificate']['clearance_m'] or 0):.1f} mm",
+    }
+    runs = f", one of {found['runs']} runs" if found["runs"] > 1 else ""
+    folder.mkdir(exist_ok=True)
+    page = folder / f"{name.replace(' ', '_')}.html"
+    reojax.view(one.robot, reojax.polygon(np.array(found["waypoints"])), page, target=np.asarray(target), rows=rows,
+                title=f"{name}: {angle}° of {axis}{runs}")  # fmt: skip
+    share(page)
+    return page
+
+
+def share(page: Path) -> None:
+    """Take the longest script out of a page, and put it beside it."""
+    text = page.read_text("utf-8")
+    longest = max(_SCRIPT.finditer(text), key=lambda found: len(found[1]))
+    (page.parent / SHARED).write_text(longest[1], "utf-8")
+    page.write_text(f'{text[: longest.start()]}<script src="{SHARED}"></script>{text[longest.end() :]}', "utf-8")
