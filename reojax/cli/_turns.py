@@ -10,13 +10,11 @@ from reojax import so3
 from reojax._internal.arrays import Array
 from reojax.cli._robot import layout_of
 from reojax.manoeuvres import BY_NAME
-from reojax.mechanics.holonomy import DEFAULT_STEPS, rotation_history
+from reojax.mechanics.attitude import roll_along
+from reojax.mechanics.holonomy import DEFAULT_STEPS, refinement, rotation_history
 from reojax.path import joint_travel
 from reojax.robot import Robot
 from reojax.robots import with_end_inertia, with_gear_ratio, with_rotor_inertia
-
-_RESOLVED = np.deg2rad(270)
-"""Largest change of a joint angle on an edge for which the default steps are meant [rad]."""
 
 
 def turn_function(
@@ -45,7 +43,7 @@ def turn_function(
     """
     layout = layout_of(robot)
     longest = max(float(np.abs(values).max()) for values in amplitudes.values())
-    samples = DEFAULT_STEPS * max(1, int(np.ceil(longest / _RESOLVED - 1e-9)))
+    samples = DEFAULT_STEPS * refinement(longest)
     fixed = {name: values[0] for name, values in amplitudes.items()}
     path_of = BY_NAME[manoeuvre]
     changes = {"end_inertia": with_end_inertia, "gear": with_gear_ratio, "rotor_inertia": with_rotor_inertia}
@@ -59,9 +57,8 @@ def turn_function(
         path = path_of(design["twist"], design["bend"], layout)
         history = rotation_history(changed, path, samples=samples)
         end = history[-1]
-        about_z = jnp.arctan2(history[:, 1, 0] - history[:, 0, 1], history[:, 0, 0] + history[:, 1, 1])
         found = {
-            "roll": jnp.unwrap(about_z)[-1],
+            "roll": roll_along(history)[-1],
             "off_axis": jnp.arctan2(jnp.hypot(end[0, 2], end[1, 2]), end[2, 2]),
             "angle": so3.angle(end),
             "travel": jnp.asarray(joint_travel(path)),

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from reojax.path import Path
     from reojax.robot import Robot
 
-_RESOLVED = 270.0
-"""Largest change of a joint angle on an edge for which the default steps and samples are meant [deg]."""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `reojax simulate`."""
@@ -96,11 +93,10 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
     from reojax import so3
     from reojax.mechanics.attitude import tilt_and_roll
     from reojax.mechanics.certificate import DEFAULT_SAMPLES, certify_rotation
-    from reojax.mechanics.holonomy import DEFAULT_STEPS
+    from reojax.mechanics.holonomy import DEFAULT_STEPS, refinement
     from reojax.session import LEAST_COMPILE
 
-    longest = np.rad2deg(np.abs(np.diff(path.waypoints, axis=0)).max())
-    finer = max(1, int(np.ceil(longest / _RESOLVED - 1e-9)))
+    finer = refinement(float(np.abs(np.diff(path.waypoints, axis=0)).max()))
     steps, samples = finer * DEFAULT_STEPS, finer * DEFAULT_SAMPLES
 
     @partial(jax.jit, compiler_options=LEAST_COMPILE)

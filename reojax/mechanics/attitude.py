@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -21,8 +22,13 @@ def tilt_and_roll(rotations: Float[Array, "m 3 3"]) -> Float[np.ndarray, "m 3"]:
     # the tilt turns z to (x, y, z) about (-y, x, 0), by the angle between them
     level = np.hypot(x, y)
     factor = np.divide(np.arctan2(level, z), level, out=np.ones_like(level), where=level > 0)
-    roll = np.unwrap(np.arctan2(r[:, 1, 0] - r[:, 0, 1], r[:, 0, 0] + r[:, 1, 1]))
-    return np.stack([-y * factor, x * factor, roll], axis=1)
+    return np.stack([-y * factor, x * factor, roll_along(r)], axis=1)
+
+
+def roll_along(rotations: Float[Array, "m 3 3"]) -> Float[Array, " m"]:
+    """The roll about z of `tilt_and_roll` alone [rad]; may be traced."""
+    r, xp = rotations, np if isinstance(rotations, np.ndarray) else jnp
+    return xp.unwrap(xp.arctan2(r[:, 1, 0] - r[:, 0, 1], r[:, 0, 0] + r[:, 1, 1]))
 
 
 LEVEL = 0.1

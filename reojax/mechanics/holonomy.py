@@ -11,6 +11,7 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from reojax._internal.arrays import Array, common_float
@@ -24,6 +25,15 @@ from reojax.robot import Robot
 
 DEFAULT_STEPS = 4
 """Steps per edge that bring every named robot's manoeuvres within 1e-9 rad (32 evaluations of omega an edge)."""
+
+
+RESOLVED_EDGE = np.deg2rad(270)
+"""Largest change of a joint angle on an edge for which the default steps and samples are meant [rad]."""
+
+
+def refinement(longest: float) -> int:
+    """How many times the default steps or samples an edge takes that changes a joint angle by `longest` [rad]."""
+    return max(1, int(np.ceil(longest / RESOLVED_EDGE - 1e-9)))
 
 
 def net_rotation(robot: Robot, path: Path, *, steps: int = DEFAULT_STEPS) -> Float[Array, "3 3"]:

@@ -20,7 +20,7 @@ from jaxtyping import Float
 from reojax._internal.arrays import Array
 from reojax.manoeuvres import Layout, fold_angles
 from reojax.mechanics._fast.parameters import Pattern, pattern_of
-from reojax.mechanics.holonomy import DEFAULT_STEPS, _net_rotation, net_rotation
+from reojax.mechanics.holonomy import DEFAULT_STEPS, _net_rotation, net_rotation, refinement
 from reojax.mechanics.own_units import without_names
 from reojax.path import polygon
 from reojax.planning import quaternions
@@ -30,8 +30,6 @@ from reojax.session import usable_cores
 
 _CHUNK = 128
 """Loops per call: one program for any number of them."""
-_LONGEST_EDGE = 4.8
-"""Largest change of a joint angle on an edge for which the default steps are meant [rad]."""
 _CELL = 0.16
 """Widest cell of a table [rad], up to `_MOST_NODES`."""
 _FEWEST_NODES = {2: 65, 3: 33}
@@ -44,7 +42,7 @@ def true_rotations(robot: Robot, layout: Layout, amplitudes: Float[np.ndarray, "
     count = twist.shape[0]
     padded = -count % _CHUNK
     corners = np.pad(loop_corners(layout, twist, bend, last), ((0, padded), (0, 0), (0, 0)))
-    steps = 2 * DEFAULT_STEPS * max(1, int(np.ceil(np.abs(amplitudes).max(initial=0.0) / _LONGEST_EDGE)))
+    steps = 2 * DEFAULT_STEPS * refinement(float(np.abs(amplitudes).max(initial=0.0)))
 
     pattern = pattern_of(robot)
 
