@@ -72,8 +72,9 @@ def main(out: Path, *, quick: bool = False) -> dict:
                 f"{row['largest_deg']:6.2f} {row['largest_change_deg']:7.1f}",
                 flush=True,
             )
-    speed = _speed(ways["Steering"], robot)
-    print("processor time [ms]: " + ", ".join(f"{name} {1e3 * value:.2f}" for name, value in speed.items()))
+    speed = {} if quick else _speed(ways["Steering"], robot)
+    if speed:
+        print("processor time [ms]: " + ", ".join(f"{name} {1e3 * value:.2f}" for name, value in speed.items()))
     result = {"releases": releases, "rows": rows, "processor_s": speed}
     write_json(file, result)
     return result

@@ -52,8 +52,8 @@ class _State(NamedTuple):
     steps: Array
 
 
-@partial(jax.jit, static_argnums=(1, 2))
-def solve(task: Task, pieces: int, max_steps: int, points, goals, momenta, durations, tolerance) -> Answer:
+@partial(jax.jit, static_argnums=1)
+def solve(task: Task, pieces: int, max_steps: int | Array, points, goals, momenta, durations, tolerance) -> Answer:
     """Many releases side by side: `points` (m, p + 1, j) to start from, and of each its goal, momentum, duration."""
     one = partial(_solve_one, task, pieces, max_steps)
     points, goals, momenta, durations = map(jnp.asarray, (points, goals, momenta, durations))
@@ -74,7 +74,7 @@ def rows_at_steps(pieces: int, steps: int, duration: Array, dtype: np.dtype) -> 
     return rows * (1 / duration) ** jnp.arange(3, dtype=dtype)[None, :, None]
 
 
-def _solve_one(task: Task, pieces: int, max_steps: int, points, goal, momentum, duration, tolerance) -> Answer:
+def _solve_one(task: Task, pieces: int, max_steps: int | Array, points, goal, momentum, duration, tolerance) -> Answer:
     robot, dtype = task.robot, points.dtype
     variables, x = free_points(robot, points)
     rows = rows_at_steps(pieces, STEPS, duration, dtype)

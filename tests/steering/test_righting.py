@@ -10,7 +10,7 @@ import pytest
 import reojax
 from reojax import RE_MAX_17, robots, so3
 from reojax.optimisation.status import Status
-from reojax.steering.result import Righting
+from reojax.steering.result import Righting, trajectory_through
 from reojax.steering.righting import righting, righting_many
 
 ROBOT = robots.prototype()
@@ -64,6 +64,21 @@ def test_conservation_by_muj_co():
         half = rotation @ np.asarray(so3.exp(h / 2 * omega(rotation)))
         rotation = rotation @ np.asarray(so3.exp(h * omega(half)))
     assert so3.angle(jnp.asarray(rotation).T @ TARGETS[0]) < 1e-3
+
+
+def test_motors_are_held():
+    """In 0.3 s, the motion found without them asks for more than their supply; with them for less, and it is told."""
+    free = righting_many(ROBOT, TARGETS, momenta=MOMENTA, duration=0.3)
+    held = righting(ROBOT, TARGETS[0], momentum=MOMENTA[0], duration=0.3, motors=RE_MAX_17)
+    assert free.converged[0]
+    assert held.converged
+    margins = []
+    for points in (free.points[0], held.points):
+        motion = trajectory_through(points, 0.3)
+        margins.append(reojax.simulate(ROBOT, motion, momentum=MOMENTA[0], motors=RE_MAX_17, samples=64).margin.min())
+    assert margins[0] < -0.05
+    assert margins[1] > 0
+    np.testing.assert_allclose(held.margin, margins[1], atol=3e-3)
 
 
 @pytest.mark.slow
