@@ -13,6 +13,8 @@ from reojax import so3
 SHARED = "three.js"
 """The library that draws, six parts in seven of a page by itself."""
 _SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
+_POLICY = ("script-src 'unsafe-inline';", "script-src 'unsafe-inline' 'self' file:;")
+"""What a page allows itself to load: as `view` writes it, and with what lies beside it."""
 
 
 def write(name: str, row: Row, folder: Path) -> Path | None:
@@ -39,8 +41,9 @@ def write(name: str, row: Row, folder: Path) -> Path | None:
 
 
 def share(page: Path) -> None:
-    """Take the longest script out of a page, and put it beside it."""
+    """Take the longest script out of a page, put it beside it, and allow the page to load what lies there."""
     text = page.read_text("utf-8")
     longest = max(_SCRIPT.finditer(text), key=lambda found: len(found[1]))
     (page.parent / SHARED).write_text(longest[1], "utf-8")
-    page.write_text(f'{text[: longest.start()]}<script src="{SHARED}"></script>{text[longest.end() :]}', "utf-8")
+    text = f'{text[: longest.start()]}<script src="{SHARED}"></script>{text[longest.end() :]}'
+    page.write_text(text.replace(*_POLICY, 1), "utf-8")
