@@ -27,9 +27,9 @@ _ROUND = 0.001
 margin that rest barely has can be kept."""
 _SHARE = 0.5
 """Share of what a pair has beyond the margin that is asked of it at most; rounding off takes some of the rest."""
-_LONG, _REFINED = 4, 2
-"""Samples of an edge from which its nearest place is made more exact by a parabola, and how often; edges of a curve are
-short enough without."""
+_LONG = 4
+"""Samples of an edge from which its nearest place is made more exact by a parabola; edges of a curve are short enough
+without."""
 _SAMPLES = 96
 """Samples of a path by default, one an edge at least."""
 _GROUPS = 12
@@ -152,25 +152,15 @@ def _closest(
     pair, nearest = flat // (samples + 1), flat % (samples + 1)
     place = nearest.astype(start.dtype)
     if samples >= _LONG:
-        edge, step = np.arange(edges), 1.0
-        middle = jnp.clip(place, 1, samples - 1)
-        around = [gap[edge, pair, jnp.clip(nearest, 1, samples - 1) + by] for by in (-1, 0, 1)]
-        least = gap[edge, pair, nearest]
-        for _ in range(_REFINED):
-            before, here, after = around
-            bend = before - 2 * here + after
-            vertex = middle + step * 0.5 * (before - after) / jnp.where(bend > 0, bend, 1)
-            vertex = jnp.clip(
-                jnp.where(bend > 0, vertex, place), jnp.maximum(place - 1, 0), jnp.minimum(place + 1, samples)
-            )
-            step = step / 8
-            middle = jnp.clip(vertex, step, samples - step)
-            close = ends_at((middle[:, None] + step * jnp.array([-1.0, 0, 1], start.dtype)[None]) / samples)
-            around = list((quick_distance(*(x[:, pair, edge] for x in close)) - reserve[pair, None]).T)
-        there = around[1]
+        edge, middle = np.arange(edges), jnp.clip(nearest, 1, samples - 1)
+        before, here, after = (gap[edge, pair, middle + by] for by in (-1, 0, 1))
+        least, bend = gap[edge, pair, nearest], before - 2 * here + after
+        vertex = jnp.where(bend > 0, middle + 0.5 * (before - after) / jnp.where(bend > 0, bend, 1), place)
+        vertex = jnp.clip(vertex, jnp.maximum(place - 1, 0), jnp.minimum(place + 1, samples))
+        there = quick_distance(*(x[:, pair, edge, 0] for x in ends_at(vertex[:, None] / samples))) - reserve[pair]
         # where centre lines nearly cross, distances are no parabola: the sample, whose place does not move, is better
         smooth = least > -0.5 * reserve[pair]
-        place = jnp.where(smooth & (there < least), middle, place)
+        place = jnp.where(smooth & (there < least), vertex, place)
     return place / samples
 
 

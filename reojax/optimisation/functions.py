@@ -21,8 +21,8 @@ from reojax._internal.checks import shorten
 
 Function = Callable[..., Any]
 Part = Callable[[Array, Any], Any]
-_BLOCK, _VALUES_BLOCK = 8, 16
-"""Most starts differentiated, and most points evaluated, in one call."""
+_BLOCK, _VALUES_BLOCK = 8, 12
+"""Most starts differentiated in one call, and points evaluated: as many as a line search looks at."""
 
 
 class Values(NamedTuple):

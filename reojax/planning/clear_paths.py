@@ -31,13 +31,20 @@ class Clear(NamedTuple):
     """What each pair has at the postures that every path passes [m]."""
 
     def proven(self, paths: Float[np.ndarray, "m v j"], tolerance: float = 1e-4) -> Float[np.ndarray, " m"]:
-        """Proven least clearance of each path, within `tolerance` of the true least [m]."""
-        return np.asarray(self._look(paths, (tolerance, -np.inf, np.inf)).distance, float)
+        """Proven least clearance of each path, within `tolerance` of the true least [m], or the margin."""
+        bound = np.asarray(self._look(paths, (tolerance, -np.inf, np.inf)).distance, float)
+        short = np.flatnonzero((bound < self.margin) & (bound + tolerance >= self.margin))
+        if len(short):
+            bound[short] = np.maximum(bound[short], self._enough(paths[short]))
+        return bound
 
     def kept(self, paths: Float[np.ndarray, "m v j"]) -> np.ndarray:
         """Which paths (m,) are proven to keep the margin; quicker than `proven`."""
-        found = self._look(paths, (0.02 * self.margin + 1e-5, self.margin, self.margin))
-        return np.asarray(found.distance, float) >= self.margin
+        return self._enough(paths) >= self.margin
+
+    def _enough(self, paths: Float[np.ndarray, "m v j"]) -> Float[np.ndarray, " m"]:
+        """Lower bounds on the clearance, made sharp only as far as it takes to tell whether the margin is kept [m]."""
+        return np.asarray(self._look(paths, (0.02 * self.margin + 1e-5, self.margin, self.margin)).distance, float)
 
     def with_spare(self, spare: float) -> Float[np.ndarray, " p"]:
         """Clearance to ask of each pair at samples [m], up to `spare` more than the margin."""

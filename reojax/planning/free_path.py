@@ -243,7 +243,7 @@ def _solve(
     count = len(freedom.joints)
     corners = corners or corners_for(count)
     polygons = polygons_of(robot, freedom, corners)
-    table = table_of(polygons, freedom, key_of(robot), seed)
+    table = table_of(polygons, freedom, key_of(robot), seed, clear)
     reach = reach_of(robot, freedom, polygons, table.turns)
     fold = _fold_rotation(polygons, before, corners)
     wanted = quaternions.to_matrices(quaternions.from_matrices(targets))

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,8 @@ _ROWS, _LEAST_ROWS = 32, 4
 """Polygons solved side by side, at most and at least: few shapes, few programs."""
 _ROUNDS = 6
 """How often starts are tried for targets that are not reached."""
+_FIRST_STEPS = 40
+"""Steps of those with a clearance before the best are chosen; contact bends the ways there, and they end late."""
 _FINALISTS = 2
 """Polygons of each target that are improved to the end."""
 _ROUND, _SHARP = 0.1, 0.01
@@ -42,7 +43,7 @@ _IDLE = 1e-3
 """Joints that move less than this anywhere on a path [rad], where they may go a radian or more, are held at the end."""
 _OFF = 1e6
 """Joint travel [rad] that is worse than any."""
-_SPARE = 0.02
+_SPARE = 0.06
 """Share of the clearance that is asked for on top of it at first, for what lies between samples."""
 _MOST_TURN = 3.0
 """Largest turn of one loop that is looked for [rad]; the logarithm has no derivative at a half turn."""
@@ -117,6 +118,7 @@ class Search:
         slope: float = _SLOPE,
         axes: np.ndarray | None = None,
         held: np.ndarray | None = None,
+        most_steps: int | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Improve polygons (m, n) for targets (m, 3, 3), or for turning far about `axes`: polygons, misses, travel.
 
@@ -155,7 +157,7 @@ class Search:
                 ),
                 tolerance=exact,
                 slope_tolerance=slope,
-                max_steps=self.max_steps,
+                max_steps=min(most_steps or self.max_steps, self.max_steps),
             )
             parts.append((found.value[:size], found.residual[:size], found.cost[:size]))
             self._bar.update(size)
@@ -164,38 +166,25 @@ class Search:
 
     def _first(self, targets: np.ndarray, exact: np.ndarray, hints: np.ndarray | None) -> np.ndarray:
         """Polygons (m, f, n) for each target: of those from some starts the ones of least travel, or the closest."""
-        tried = np.array([self._starts(target) for target in targets])
+        tried = np.array([self.table.near(target, self.rounds * self.starts) for target in targets])
         if hints is not None:
             tried = np.concatenate([hints, tried], axis=1)[:, : tried.shape[1]]
         worth = np.full(tried.shape[:2], np.inf)
+        steps, close = (None, _REACHED) if self.clear is None else (_FIRST_STEPS, _NEAR)
         for first in range(0, tried.shape[1], self.starts):
             waiting = np.flatnonzero(worth.min(1) >= _OFF)
             if not len(waiting):
                 break
             x = tried[waiting, first : first + self.starts]
             owner, shape = np.repeat(waiting, x.shape[1]), x.shape
-            x, miss, travel = self._solve(x.reshape(len(owner), -1), targets[owner], exact[waiting].min(), _ROUND)
+            x, aim = x.reshape(len(owner), -1), targets[owner]
+            x, miss, travel = self._solve(x, aim, exact[waiting].min(), _ROUND, most_steps=steps)
             tried[waiting, first : first + self.starts] = x.reshape(shape)
             if self.clear is not None:  # what touches between the samples is no answer
                 miss = np.where(self.clear.kept(self.polygons.paths(x, self.freedom)), miss, 10.0 + miss)
-            value = _worth(miss, travel, _REACHED * exact[owner])
+            value = _worth(miss, travel, close * exact[owner])
             worth[waiting, first : first + self.starts] = value.reshape(shape[:2])
         return np.take_along_axis(tried, worth.argsort(1)[:, :_FINALISTS, None], 1)
-
-    def _starts(self, target: np.ndarray) -> np.ndarray:
-        """Random polygons (s, n) near a target, clear ones where that is asked, as far as there are enough."""
-        count = self.rounds * self.starts
-        if self._clear_rows is None:
-            return self.table.near(target, count)
-        x = self.table.near_among(self._clear_rows, target, count)
-        return np.concatenate([x, self.table.near(target, count)])[:count]
-
-    @cached_property
-    def _clear_rows(self) -> np.ndarray | None:
-        """Which polygons of the table are clear at a few samples, if a clearance is asked for."""
-        if self.clear is None:
-            return None
-        return np.flatnonzero(self.clear.sampled(self.polygons.paths(self.table.x, self.freedom)))
 
     def _improve(self, found: np.ndarray, targets: np.ndarray, exact: np.ndarray, tolerance: np.ndarray) -> np.ndarray:
         """The best polygon (m, n) of some for each target, once they are improved to the end."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from reojax.planning import quaternions
+from reojax.planning.clear_paths import Clear
 from reojax.planning.free_polygons import COARSE, Polygons
 from reojax.planning.freedom import Freedom
 from reojax.planning.store import Store
@@ -16,8 +17,8 @@ _RANDOM = 4096
 """Random polygons of either kind: on the prototype half as many take 2 % more travel in the median."""
 _PRICE = 60.0
 """Travel that a radian of distance to the target counts for among them [rad]."""
-_STEEP = 600.0
-"""The same among polygons that are clear of the robot itself, the shortest of which hardly move."""
+_CONTACT = 1e6
+"""Travel that contact counts for, where polygons are to be clear of the robot itself [rad]."""
 _KEPT = 8
 """Robots and limits whose polygons are kept."""
 
@@ -30,18 +31,20 @@ class PolygonTable(NamedTuple):
     """Quaternions of their net rotations."""
     lengths: Float[np.ndarray, " m"]
     """Their joint travel [rad]."""
+    clear: Bool[np.ndarray, " m"] | None = None
+    """Which of them keep the clearance at a few samples, if one is asked for."""
 
     def near(self, target: Float[np.ndarray, "3 3"], count: int) -> Float[np.ndarray, "c n"]:
-        """Those which end near a target with little travel, the most promising first, of either kind in turn."""
-        away = quaternions.angles(quaternions.product(quaternions.from_matrices(target.T[None]), self.turns))
-        order = np.argsort((self.lengths + _PRICE * away).reshape(2, -1), axis=1) + [[0], [self.x.shape[0] // 2]]
-        return self.x[order.T.ravel()[:count]]
+        """Those which end near a target with little travel, the most promising first, of either kind in turn.
 
-    def near_among(self, rows: np.ndarray, target: Float[np.ndarray, "3 3"], count: int) -> Float[np.ndarray, "c n"]:
-        """Those of some rows which end nearest to a target; that they are short hardly counts, for still ones are."""
-        turns = self.turns[:, rows]
-        away = quaternions.angles(quaternions.product(quaternions.from_matrices(target.T[None]), turns))
-        return self.x[rows[np.argsort(self.lengths[rows] + _STEEP * away)[:count]]]
+        If a clearance is asked for, those that keep it come first, as far as there are enough.
+        """
+        away = quaternions.angles(quaternions.product(quaternions.from_matrices(target.T[None]), self.turns))
+        worse = self.lengths + _PRICE * away
+        if self.clear is not None:
+            worse = worse + np.where(self.clear, 0.0, _CONTACT)
+        order = np.argsort(worse.reshape(2, -1), axis=1) + [[0], [self.x.shape[0] // 2]]
+        return self.x[order.T.ravel()[:count]]
 
     def farthest(self, axis: Float[np.ndarray, "3"], count: int) -> Float[np.ndarray, "c n"]:
         """Those which turn most about an axis and little otherwise, with that turn as their last variable."""
@@ -61,13 +64,18 @@ class PolygonTable(NamedTuple):
 
 
 _tables: Store[PolygonTable] = Store(_KEPT)
+_clear: Store[np.ndarray] = Store(_KEPT)
 
 
-def table_of(polygons: Polygons, freedom: Freedom, key: object, seed: int) -> PolygonTable:
-    """Random polygons of a robot (its `key`) within some limits; the last few are kept."""
+def table_of(polygons: Polygons, freedom: Freedom, key: object, seed: int, clear: Clear | None = None) -> PolygonTable:
+    """Random polygons of a robot (its `key`) within some limits, and which are clear; the last few are kept."""
     bounds = (freedom.start, freedom.end, freedom.low, freedom.high)
     whole = key, freedom.joints, polygons.corners, seed, *(array.tobytes() for array in bounds)
-    return _tables.get(whole, lambda: _table(polygons, freedom, seed))
+    table = _tables.get(whole, lambda: _table(polygons, freedom, seed))
+    if clear is None:
+        return table
+    rows = _clear.get((*whole, clear.margin), lambda: clear.sampled(polygons.paths(table.x, freedom)))
+    return table._replace(clear=rows)
 
 
 def _table(polygons: Polygons, freedom: Freedom, seed: int) -> PolygonTable:
