@@ -16,8 +16,20 @@ shapes.install()
 
 from reojax.session import compile_quickly  # noqa: E402
 
-MOST_BYTES = 2e9
-"""Memory of a process from which on compiled programs are let go."""
+MOST_BYTES, GROWTH = 2e9, 1e9
+"""Memory of a process from which on compiled programs are let go, and how much more it takes before the next time."""
+_most = MOST_BYTES
+LONGEST = (
+    "planning/test_free_paths.py",
+    "planning/test_plan.py",
+    "captures/test_calibration.py",
+    "collision/test_path_clearance.py",
+    "cli/test_plan_readers.py",
+    "mechanics/test_no_lapack.py",
+    "mechanics/test_derivatives.py",
+    "design/test_authority.py",
+)
+"""Files that take longest, begun first: no process is left alone with one of them at the end."""
 X64 = os.environ.get("REOJAX_TEST_X64", "1") != "0"
 
 compile_quickly()
@@ -43,7 +55,9 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Without float64 only the tests that are meant for that run."""
+    """The longest files first; without float64 only the tests that are meant for that run."""
+    place = {Path(__file__).parent / name: rank for rank, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path, len(place)))
     if not X64:
         skip = pytest.mark.skip(reason="needs float64")
         for item in items:
@@ -53,10 +67,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(autouse=True, scope="module")
 def _forget_programs() -> Iterator[None]:
-    """Compiled programs take gigabytes by the end: they are let go before that, and not after every file."""
+    """Compiled programs take gigabytes by the end: they are let go before that, and not after every file.
+
+    Freed memory is held for what comes, so what counts is how much has been taken since they were let go last.
+    """
+    global _most
     yield
-    if _resident() > MOST_BYTES:
+    if _resident() > _most:
         jax.clear_caches()
+        gc.collect()
+        _most = _resident() + GROWTH
 
 
 def _resident() -> float:

@@ -67,8 +67,8 @@ class FitProblem:
 
     def fit_window(self, x: np.ndarray) -> FitState:
         """The state at the parameters `x`, frame and shift at their best."""
-        turned, _ = self._orientation(x)
-        state = self._state(x, align_frames(self.measured, turned[self.seen]), 0.0)
+        moved = self._orientation(x)
+        state = self._state(x, align_frames(self.measured, moved[0][self.seen]), 0.0, moved)
         return self.fit(state, 20, fixed=True)[0]
 
     def fit(self, begun: FitState, most: int, fixed: bool = False) -> tuple[FitState, bool, int]:
@@ -81,12 +81,13 @@ class FitProblem:
         from scipy.spatial.transform import Rotation
 
         p = 0 if fixed else len(begun.x)
+        moved = self._orientation(begun.x) if fixed else None
 
         @lru_cache(maxsize=2)  # residuals and derivatives are asked for at the same place
         def state_of(unknowns: tuple[float, ...]) -> FitState:
             x = begun.x if fixed else np.array(unknowns[:p]) * self.scale
             frame = Rotation.from_rotvec(unknowns[p : p + 3]).as_matrix() @ begun.frame
-            return self._state(x, frame, unknowns[p + 3] if self.clock else 0.0)
+            return self._state(x, frame, unknowns[p + 3] if self.clock else 0.0, moved)
 
         def state_at(unknowns: np.ndarray) -> FitState:
             return state_of(tuple(unknowns.tolist()))
@@ -151,10 +152,13 @@ class FitProblem:
         turned = chain(np.asarray(turns)[: self.edges])
         return turned, turned[1:] @ np.asarray(effect)[: self.edges]
 
-    def _state(self, x: np.ndarray, frame: np.ndarray, offset: float) -> FitState:
+    def _state(
+        self, x: np.ndarray, frame: np.ndarray, offset: float, moved: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> FitState:
+        """Everything at `x`; `moved` is what `_orientation` gives there, where it is known."""
         from scipy.spatial.transform import Rotation
 
-        turned, effect = self._orientation(x)
+        turned, effect = self._orientation(x) if moved is None else moved
         when, edge, length = self._place(offset)
         residual = Rotation.from_matrix(
             self.measured @ (frame @ interpolate(self.time, turned)(when)).swapaxes(1, 2)

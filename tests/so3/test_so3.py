@@ -49,6 +49,9 @@ ARGUMENT = {"hat": "vector", "vee": "matrix", "exp": "vector", "log": "rotation"
 ARGUMENT |= {"left_jacobian": "vector", "to_quaternion": "rotation", "from_quaternion": "quaternion"}
 ARGUMENT |= {"to_euler_zxz": "rotation", "from_euler_zxz": "angles"}
 
+GAUSS = np.polynomial.legendre.leggauss(len(VECTORS))
+"""As many nodes as a batch has."""
+
 components = st.floats(-4.0, 4.0, allow_subnormal=False)
 vectors = st.tuples(components, components, components).map(np.array)
 laws = settings(deadline=None, derandomize=True, max_examples=60)
@@ -240,7 +243,7 @@ def test_vee_takes_the_skew_part():
 @given(vectors)
 def test_left_jacobian_is_the_mean_of_the_rotations_on_the_way(v):
     """J(v) is the integral of exp(s v) for s from 0 to 1 (Gauss quadrature), and exp(v) - I = hat(v) J(v)."""
-    nodes, weights = np.polynomial.legendre.leggauss(len(VECTORS))
+    nodes, weights = GAUSS
     mean = np.einsum("i,iab->ab", weights / 2, exps((nodes[:, None] + 1) / 2 * v))
     close(left_jacobian(v), mean, 1e-13)
     close(hat(v) @ left_jacobian(v), exp(v) - np.eye(3), 3e-14)
