@@ -5,7 +5,7 @@
 Polygons with four free corners within 270/120. The plain optimum has least joint travel, the robust one least mean
 square turn of the result when the inertia of every link and of every rotor has an independent error of 5 %, with no
 more travel than the thesis's 270/120 loop (1320 degrees). Both hit the target exactly with the nominal robot. The
-spread of both is then computed by the linear rule and by sampling robots through `reojax.sweeps`.
+spread of both is then computed by the linear rule and by sampling robots.
 
 Expected: the robust loop's spread is smaller; the linear rule and the samples agree to a few per cent.
 """

@@ -88,9 +88,9 @@ def theirs(problem: Problem, starts: np.ndarray) -> dict[str, Any]:
     equality = jax.jit(lambda x: problem.equality(whole(x)))
     slope = jax.jit(jax.jacrev(lambda x: problem.equality(whole(x))))
     first = starts[0, place]
-    price = np.asarray(jax.grad(lambda x: problem.cost(whole(x)))(first))
-    rows = np.asarray(jax.jacfwd(lambda x: problem.inequality(whole(x)))(first))
-    offset = np.asarray(problem.inequality(whole(first))) - rows @ first
+    linear = lambda x: (problem.cost(whole(x)), problem.inequality(whole(x)))
+    (_, least), (price, rows) = map(jax.device_get, jax.jit(lambda x: (linear(x), jax.jacfwd(linear)(x)))(first))
+    offset = least - rows @ first
     jax.block_until_ready((equality(first), slope(first)))
     constraints = [
         {"type": "eq", "fun": lambda x: np.asarray(equality(x)), "jac": lambda x: np.asarray(slope(x))},

@@ -37,6 +37,8 @@ _FIELDS = {
     "rotor_inertia": "kg m^2",
     "gear_ratio": "",
 }
+_DRAWS = 4096
+"""Most robots of the Monte Carlo check in one call."""
 _ENTRIES = [("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2)]
 
 
@@ -136,7 +138,7 @@ def spread(
         tolerances: standard deviations by field: relative for "mass" (the link's inertia goes with it), "inertia",
             "rotor_inertia" and "gear_ratio"; in m for "com" and "anchor", each component; in rad for "axis", two
             tilts. One number, or one for every link or joint.
-        draws: robots drawn for the Monte Carlo check, normal errors (relative ones lognormal); run by `sweep`.
+        draws: robots drawn for the Monte Carlo check, normal errors (relative ones lognormal).
         seed: of the draw.
         frame: frame of the turns, see this module.
         steps: steps per edge of `net_rotation`.
@@ -144,8 +146,6 @@ def spread(
     Raises:
         ValueError: for unknown fields, negative tolerances, an unknown frame, or too few draws.
     """
-    from reojax.sweeps import sweep, zipped
-
     _check_frame(frame)
     draws, seed = checks.whole("draws", draws, 2), checks.seed(seed)
     check_path(check_robot(robot), path)
@@ -155,12 +155,10 @@ def spread(
     jacobian = np.asarray(_jacobian(without_names(robot), path, sources, steps))  # (3, k)
     errors = np.random.default_rng(seed).normal(size=(draws, len(sources.name)))
 
-    def turn(**error: Array) -> Array:
-        other = perturb(robot, sources, jnp.stack([error[f"e{i}"] for i in range(len(sources.name))]))
-        return so3.log(net_rotation(other, path, steps=steps) @ nominal.T)
-
-    columns = {f"e{i}": errors[:, i] for i in range(len(sources.name))}
-    turns = np.asarray(sweep(turn, zipped(columns), progress=False).results)
+    plain, rounds = without_names(robot), -(-draws // _DRAWS)
+    rows = -(-draws // rounds)  # the last round is filled up: one program serves them all
+    drawn = np.concatenate([errors, np.zeros((rounds * rows - draws, errors.shape[1]))]).reshape(rounds, rows, -1)
+    turns = np.concatenate([np.asarray(_turns(plain, path, sources, part, nominal, steps)) for part in drawn])[:draws]
     if frame == "end":
         turns, jacobian = turns @ np.asarray(nominal), np.asarray(nominal).T @ jacobian
     covariance = jacobian @ jacobian.T
@@ -211,6 +209,18 @@ def _slopes(robot: Robot, path: Path, steps: int) -> tuple[Robot, Array]:
     nominal = net_rotation(robot, path, steps=steps)
     turn = jax.jacrev(lambda robot: so3.log(net_rotation(robot, path, steps=steps) @ nominal.T))
     return turn(robot), nominal
+
+
+@partial(jax.jit, static_argnums=(2, 5))
+def _turns(
+    robot: Robot, path: Path, sources: Sources, errors: Float[Array, "d k"], nominal: Float[Array, "3 3"], steps: int
+) -> Float[Array, "d 3"]:
+    """Turns from the nominal result of robots with errors, in standard deviations."""
+
+    def turn(error: Array) -> Array:
+        return so3.log(net_rotation(perturb(robot, sources, error), path, steps=steps) @ nominal.T)
+
+    return jax.vmap(turn)(errors)
 
 
 @partial(jax.jit, static_argnums=(2, 3))

@@ -6,6 +6,7 @@ import pytest
 
 import reojax
 from reojax import design, net_rotation, so3
+from reojax.design.uncertainty import _jacobian, _turns
 from reojax.robots.random import random_robot
 
 ROBOT = random_robot(1, 2)
@@ -90,6 +91,23 @@ def test_one_error_by_hand():
     slope = (turn(up) - turn(down)) / 0.002
     found = design.spread(ROBOT, PATH, {"mass": [0, 0.01, 0]}, draws=10)
     np.testing.assert_allclose(found.covariance, np.outer(slope, slope) * 1e-4, atol=1e-6 * slope @ slope * 1e-4)
+    errors = np.random.default_rng(0).normal(size=(10, 3))[:, 1]
+    np.testing.assert_allclose(found.turns, np.outer(errors, slope) * 1e-2, atol=1e-3 * np.linalg.norm(slope))
+
+
+def test_other_robots_and_paths_of_the_same_form_compile_nothing(monkeypatch):
+    """And draws in rounds are the draws in one."""
+    tolerances = {"mass": [0, 0.01, 0]}
+    design.spread(ROBOT, PATH, tolerances, draws=10)
+    before = _turns._cache_size(), _jacobian._cache_size()
+    other = ROBOT.replace(mass=1.1 * np.array(ROBOT.mass), name="other")
+    one = design.spread(other, reojax.Path(0.9 * np.asarray(PATH.waypoints)), tolerances, draws=10, seed=3)
+    assert (_turns._cache_size(), _jacobian._cache_size()) == before
+    monkeypatch.setattr("reojax.design.uncertainty._DRAWS", 10)
+    more = design.spread(other, reojax.Path(0.9 * np.asarray(PATH.waypoints)), tolerances, draws=19, seed=3)
+    assert more.turns.shape == (19, 3)
+    np.testing.assert_allclose(more.turns[:10], one.turns, atol=1e-15)
+    assert _turns._cache_size() == before[0]
 
 
 @pytest.mark.parametrize(
