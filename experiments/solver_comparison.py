@@ -41,12 +41,12 @@ def main(out: Path, *, quick: bool = False) -> dict:
     loop = design.polygons(robot, 3 if quick else 5)
     steps = 1 if quick else 4
     problem = least_travel(robot, loop, steps=steps)
-    starts = problem.starts(16 if quick else 64, seed=1)
-    some = 2 if quick else len(starts)
+    starts = problem.starts(8 if quick else 64, seed=1)
+    some = 1 if quick else len(starts)
     answer = {
         "Problem.solve": ours(problem, starts),
         "SLSQP": theirs(problem, starts[:some]),
-        "differential evolution": evolution(robot, loop, steps=steps, generations=30 if quick else 400),
+        "differential evolution": evolution(robot, loop, steps=steps, generations=20 if quick else 400),
     }
     print(f"\n180 deg of roll by a {loop.name}, least travel\n")
     rows = ("starts", "converged", "starts_at_best", "travel_deg", "miss_rad", "evaluations", "gradients", "seconds")

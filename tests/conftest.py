@@ -1,6 +1,7 @@
 """A hostile test environment: strict shapes and dtypes, NaN is an error, float64 on; and a quick compiler.
 
-`REOJAX_TEST_X64=0` leaves float64 off, JAX's default, for the tests marked `float32`.
+`REOJAX_TEST_X64=0` leaves float64 off, JAX's default, for the tests marked `float32`. `REOJAX_TEST_CACHE` is a folder
+for compiled programs; default one of pytest's.
 """
 
 import gc
@@ -20,6 +21,8 @@ MOST_BYTES, GROWTH = 2e9, 1e9
 """Memory of a process from which on compiled programs are let go, and how much more it takes before the next time."""
 _most = MOST_BYTES
 LONGEST = (
+    "test_compile_keys.py",
+    "steering/test_righting.py",
     "planning/test_free_paths.py",
     "planning/test_plan.py",
     "captures/test_calibration.py",
@@ -47,9 +50,11 @@ def pytest_collection_finish() -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Keep compiled programs for the next run, and for the other processes of this one."""
-    if not hasattr(config, "cache"):  # pytest -p no:cacheprovider
+    told = os.environ.get("REOJAX_TEST_CACHE")
+    if not told and not hasattr(config, "cache"):  # pytest -p no:cacheprovider
         return
-    folder = Path(config.cache.mkdir("jax"))  # pyright: ignore[reportOptionalMemberAccess]
+    folder = Path(told or config.cache.mkdir("jax"))  # pyright: ignore[reportOptionalMemberAccess]
+    folder.mkdir(parents=True, exist_ok=True)
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 
