@@ -75,7 +75,8 @@ def test_motors_are_held():
     margins = []
     for points in (free.points[0], held.points):
         motion = trajectory_through(points, 0.3)
-        margins.append(reojax.simulate(ROBOT, motion, momentum=MOMENTA[0], motors=RE_MAX_17, samples=64).margin.min())
+        driven = reojax.simulate(ROBOT, motion, momentum=MOMENTA[0], motors=RE_MAX_17, samples=64)
+        margins.append(np.asarray(driven.margin, float).min())
     assert margins[0] < -0.05
     assert margins[1] > 0
     np.testing.assert_allclose(held.margin, margins[1], atol=3e-3)
