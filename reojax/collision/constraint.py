@@ -30,8 +30,9 @@ _SHARE = 0.5
 _LONG = 4
 """Samples of an edge from which its nearest place is made more exact by a parabola; edges of a curve are short enough
 without."""
-_SAMPLES = 96
-"""Samples of a path by default, one an edge at least."""
+_SAMPLES = 256
+"""Samples of a path by default, one an edge at least. With 96, links pass through each other between two samples of a
+fast loop of the prototype."""
 _GROUPS = 12
 """Most conditions by default: the edges of a longer path share some."""
 
@@ -55,7 +56,7 @@ def clearance_shortfall(
         robot: the robot.
         waypoints: corners [rad], two or more.
         margin: wanted clearance [m]; may be traced.
-        samples: per edge, static; default 96 for the whole path.
+        samples: per edge, static; default 256 for the whole path.
         between: how much more is asked for because of what lies between samples, as a multiple of the bound
             `M h^2 / 8` on how far a point leaves its chord: 2 makes a proof by `path_clearance` all but sure, at a cost
             where edges are long.

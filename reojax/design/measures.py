@@ -120,7 +120,7 @@ def clear_by(margin: float, *, samples: int | None = None) -> Measure:
 
     Args:
         margin: least distance between any two parts of the robot [m].
-        samples: per edge; default 96 for the whole loop. More of them cost less clearance where edges are long.
+        samples: per edge; default 256 for the whole loop. More of them cost less clearance where edges are long.
 
     Raises:
         ValueError: if the margin is not one finite number, or `samples` not a positive integer.

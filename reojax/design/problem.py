@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers
+from reojax.collision.path_clearance import least_clearance
 from reojax.design.loops import Loops
 from reojax.design.outcome import Measure, Outcome
 from reojax.design.self_clearance import ClearBy, prove, share_of
@@ -98,7 +99,7 @@ class Problem:
         self._inequality = self._in_a_row(inequality), self._conditions("inequality")
         self._clear = tuple(measure for measure in inequality if isinstance(measure, ClearBy))
         self._tightened = self._of_share(inequality)
-        self._least = jax.jit(jax.vmap(lambda x: self.outcome(x).clearance.distance))
+        self._proven = jax.jit(self._proof)
 
     def _in_a_row(self, measures: Sequence[Measure]) -> Vector:
         def function(x: Array) -> Array:
@@ -267,9 +268,8 @@ class Problem:
         x, lower, upper = self.space.hold(x, held)
         size = np.where(self.space.upper > self.space.lower, self.space.upper - self.space.lower, 1.0)
 
-        def run(x: np.ndarray, rows: np.ndarray, level: int) -> Solution:
-            plain = self.cost, self._equality, self._inequality
-            cost, equality, inequality = self._tightened if self._clear else plain
+        def run(functions: Sequence[Any], x: np.ndarray, rows: np.ndarray, data: Any) -> Solution:
+            cost, equality, inequality = functions
             return optimise(
                 cost,
                 x,
@@ -277,17 +277,34 @@ class Problem:
                 upper=upper[rows],
                 equality=equality,
                 inequality=inequality,
-                data=np.full(len(x), share_of(level)) if self._clear else None,
+                data=data,
                 scale=size,
                 **limits._asdict(),
             )
 
-        found = run(x, np.arange(len(x)), 0)
-        return prove(found, run, self._kept) if self._clear else found
+        every = np.arange(len(x))
+        if not self._clear:
+            return run((self.cost, self._equality, self._inequality), x, every, None)
+
+        def tightened(x: np.ndarray, rows: np.ndarray, level: int) -> Solution:
+            """As many rows at any level, for one program serves them all; those that fill them up end at once."""
+            fill = np.minimum(every, len(rows) - 1)
+            share = np.where(every < len(rows), share_of(level), np.nan)
+            found = run(self._tightened, x[fill], rows[fill], share)
+            fields = {name: value[: len(rows)] for name, value in found._asdict().items() if name != "best"}
+            return Solution(**fields, best=0)
+
+        return prove(tightened(x, every, 0), tightened, self._kept)
 
     def _kept(self, x: Float[np.ndarray, "m n"]) -> Bool[np.ndarray, " m"]:
         """Which designs are proven to keep their clearance along their whole loops."""
-        return np.asarray(self._least(x)) >= max(measure.margin for measure in self._clear)
+        return np.array([bool(self._proven(row)) for row in x], bool)
+
+    def _proof(self, x: Array) -> Array:
+        """Whether one is, looked at no closer than that takes."""
+        outcome, margin = self.outcome(x), max(measure.margin for measure in self._clear)
+        closest = 0.02 * abs(margin) + 1e-5
+        return least_clearance(outcome.robot, outcome.path.waypoints, closest, margin, margin).distance >= margin
 
 
 def _concatenate(x: Array, parts: Sequence[Any]) -> Array:

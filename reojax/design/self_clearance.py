@@ -28,7 +28,7 @@ class ClearBy:
     margin: float
     """Least distance between any two parts of the robot [m]."""
     samples: int | None = None
-    """Per edge; None for 96 along the whole loop."""
+    """Per edge; None for 256 along the whole loop."""
     spare: float | Array = 0.0
     """Asked for on top, where a proof fell short of the margin [m]; may be traced."""
 
