@@ -7,6 +7,7 @@ given times (`through`), which is another path: it rounds the corners.
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from math import comb
 from typing import NamedTuple
 
@@ -60,9 +61,16 @@ class Trajectory:
 
     def at(self, time: ArrayLike) -> State:
         """Return the joints' state at one time [s], which is held within the trajectory's own."""
-        t = jnp.clip(jnp.asarray(time, jnp.asarray(self.breaks).dtype), self.breaks[0], self.breaks[-1])
-        piece = jnp.clip((jnp.asarray(self.breaks) <= t).sum() - 1, 0, self.pieces - 1)
-        return polynomial(jnp.asarray(self.coefficients)[piece], t - jnp.asarray(self.breaks)[piece])
+        breaks = jnp.asarray(self.breaks)
+        return _state_at(breaks, jnp.asarray(self.coefficients), jnp.asarray(time, breaks.dtype))
+
+
+@partial(jax.jit, inline=True)
+def _state_at(breaks: Float[Array, " p+1"], coefficients: Float[Array, "p d+1 j"], time: Array) -> State:
+    """The state of the piece that a time is in."""
+    t = jnp.clip(time, breaks[0], breaks[-1])
+    piece = jnp.clip((breaks <= t).sum() - 1, 0, coefficients.shape[0] - 1)
+    return polynomial(coefficients[piece], t - breaks[piece])
 
 
 def polynomial(coefficients: Float[Array, "d+1 j"], time: Float[Array, ""]) -> State:
@@ -90,7 +98,15 @@ def along(path: Path, law: Law | str, durations: ArrayLike) -> Trajectory:
     _check_path(path)
     times = _durations(durations, path)
     dtype = common_float(path.waypoints, times, law)
-    points, times, breaks, powers = (jnp.asarray(x, dtype) for x in (path.waypoints, times, *law))
+    return _along(*(jnp.asarray(x, dtype) for x in (path.waypoints, times, *law)))
+
+
+@partial(jax.jit, inline=True)
+def _along(
+    points: Float[Array, "v j"], times: Float[Array, " e"], breaks: Float[Array, " q+1"], powers: Float[Array, "q d+1"]
+) -> Trajectory:
+    """Trajectory along points by the law of these breaks and powers."""
+    dtype = points.dtype
     # theta = start + turn f(t / T): powers of the law's piece, each by T^-k, times the turn of the edge
     order = jnp.arange(powers.shape[1])
     safe = jnp.where(times > 0, times, 1)
