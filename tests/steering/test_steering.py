@@ -78,9 +78,8 @@ def test_the_linear_part_is_the_law_on_board():
         named = {name: jnp.asarray(value) for name, value in row.items()}
         theirs, _ = both(named, held, time, steer, filtered, rate, error, 0.3, jnp.asarray(5e-3), 0.3)
         np.testing.assert_allclose(theirs, mine, rtol=1e-10, atol=1e-13)
-        for a, b in zip(
-            smooth(mine, filtered, rate, 2e-3, 5e-3), onboard.smooth(mine, filtered, rate, 2e-3, 5e-3), strict=True
-        ):
+        theirs = smooth(mine, filtered, rate, *map(jnp.asarray, (2e-3, 5e-3)))
+        for a, b in zip(theirs, onboard.smooth(mine, filtered, rate, 2e-3, 5e-3), strict=True):
             np.testing.assert_allclose(a, b, rtol=1e-13, atol=1e-15)
 
 
