@@ -47,7 +47,7 @@ def main(out: Path, *, quick: bool = False) -> dict:
         inequality=[lambda o: design.travel(loop)(o) - MOST_TRAVEL],
         steps=steps,
     )
-    near = least.value[np.argsort(np.where(least.converged, least.cost, np.inf))]
+    near = least.value[np.argsort(np.where(least.converged, least.cost, np.inf))][: 2 if quick else None]
     steady = robust.solve(near, hold=hold, progress="least spread", max_steps=5 if quick else 60)
 
     rows, spreads = {}, {}
