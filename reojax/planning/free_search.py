@@ -45,6 +45,8 @@ _OFF = 1e6
 """Joint travel [rad] that is worse than any."""
 _SPARE = 0.06
 """Share of the clearance that is asked for on top of it at first, for what lies between samples."""
+_EASED = 0.5
+"""Share of that at each further shift of the target."""
 _MOST_TURN = 3.0
 """Largest turn of one loop that is looked for [rad]; the logarithm has no derivative at a half turn."""
 
@@ -119,11 +121,13 @@ class Search:
         axes: np.ndarray | None = None,
         held: np.ndarray | None = None,
         most_steps: int | None = None,
+        spare: float | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Improve polygons (m, n) for targets (m, 3, 3), or for turning far about `axes`: polygons, misses, travel.
 
         Without a `rounding` of the travel only the target counts; variables `held` (m, n) stay as they are.
         """
+        spare = self.spare if spare is None else spare
         rows = 1 if len(self.freedom.start) > ALONE else min(_ROWS, max(_LEAST_ROWS, 1 << (len(x) - 1).bit_length()))
         ends = np.stack([self.freedom.start, self.freedom.end])
         turning = axes is not None
@@ -153,7 +157,7 @@ class Search:
                     rounding=np.full(rows, (rounding or 1.0) * self._fine),
                     short=np.full(rows, float(rounding is not None and not turning)),
                     far=np.full(rows, float(turning)),
-                    margin=np.tile(np.zeros(0) if self.clear is None else self.clear.with_spare(self.spare), (rows, 1)),
+                    margin=np.tile(np.zeros(0) if self.clear is None else self.clear.with_spare(spare), (rows, 1)),
                 ),
                 tolerance=exact,
                 slope_tolerance=slope,
@@ -203,7 +207,9 @@ class Search:
             shifted = wanted[going] @ turned[going].swapaxes(1, 2) @ coarse[going]
             aim = np.where(near[going, None, None], shifted, wanted[going])
             start = x[going]
-            moved, _, _ = self._solve(start, aim, exact[going].min(), None if k else _SHARP, held=self._idle(start))
+            eased = self.spare * _EASED**k  # the last way is short: what is asked for in hand may be used up
+            options = {"held": self._idle(start), "spare": eased}
+            moved, _, _ = self._solve(start, aim, exact[going].min(), None if k else _SHARP, **options)
             true, few = self._rotations(moved)
             off = apart(true, wanted[going])
             better = off < (error[going] if k else np.maximum(error, _NEAR * exact)[going])
