@@ -2,7 +2,7 @@
 
 import datetime
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import jax
 import jax.core
@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 Array = jax.Array | np.ndarray
+Tree = TypeVar("Tree")
 _RULE = "reojax computes in float32 or float64: convert them, as in `np.asarray(x, np.float64)`"
 
 
@@ -26,6 +27,11 @@ def common_float(*trees: Any) -> np.dtype:
         if dtype not in (np.float32, np.float64):
             raise ValueError(f"there are numbers of type {dtype}; {_RULE}.")
     return min(floats, key=lambda d: d.itemsize, default=jax.dtypes.canonicalize_dtype(float))
+
+
+def cast(tree: Tree, dtype: Any) -> Tree:
+    """The same with JAX arrays of that dtype; may be traced."""
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), tree)
 
 
 def kind_of_arrays(*trees: Any) -> tuple[Any, Callable[[Any], Any]]:

@@ -42,6 +42,11 @@ def own_copies(tree: Tree) -> Tree:
         return tree
 
 
+def as_double(tree: Tree) -> Tree:
+    """The same with NumPy arrays of its own in float64, whatever they were made of."""
+    return jax.tree.map(lambda leaf: np.array(leaf, float), tree)
+
+
 def warn_if_single(what: str, dtype: np.dtype) -> None:
     """Warn that float32 gives less than `what` promises."""
     if dtype == np.float32:

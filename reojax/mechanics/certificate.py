@@ -20,7 +20,7 @@ import numpy as np
 from jaxtyping import Float
 
 from reojax import so3
-from reojax._internal.arrays import Array, common_float
+from reojax._internal.arrays import Array, cast, common_float
 from reojax._internal.precision import warn_if_single
 from reojax.mechanics.holonomy import DEFAULT_STEPS, net_rotation, rotation_history
 from reojax.mechanics.input_checks import check_path, check_robot
@@ -136,7 +136,7 @@ def momentum_residual(robot: Robot, path: Path, rotations: Float[Array, "m 3 3"]
 @partial(jax.jit, static_argnums=3)
 def _residual(robot: Robot, waypoints: Array, rotations: Array, samples: int) -> jax.Array:
     dtype = common_float(robot, waypoints, rotations)
-    robot, points, turned = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), (robot, waypoints, rotations))
+    robot, points, turned = cast((robot, waypoints, rotations), dtype)
     robot = in_own_units(robot)  # the result is relative
     if points.shape[0] == 1 or not robot.joints:
         return jnp.zeros((), dtype)

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
+from reojax._internal.precision import as_double
 from reojax.mechanics.curvature import curvature_terms
 from reojax.mechanics.input_checks import check_motion
 from reojax.mechanics.integrators import GAUSS, magnus6
@@ -83,7 +84,7 @@ def controllable_directions(
     shares = np.append((np.arange(_STEPS)[:, None] + np.array(GAUSS)) / _STEPS, 1.0)
     shapes = np.concatenate([np.zeros((1, count)), (shares[:, None, None] * ray).reshape(-1, count)])
     with jax.enable_x64(True):
-        double = jax.tree.map(lambda leaf: np.array(leaf, float), without_names(robot))
+        double = as_double(without_names(robot))
         terms = _terms(double, theta + shapes @ moves.T)
     gamma, slope, field = (np.asarray(part) for part in terms)
     # by the independent joints alone, every pair once; and how large the terms are that each component is a sum of

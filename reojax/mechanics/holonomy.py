@@ -8,13 +8,14 @@ depends on the path alone, not on how fast it is run (thesis 2.4). Along each st
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from reojax._internal.arrays import Array, common_float
+from reojax._internal.arrays import Array, cast, common_float
 from reojax.mechanics._fast.net_rotation import net_rotation as fast_net_rotation, steps_of_path
 from reojax.mechanics._fast.parameters import Pattern, pattern_of
 from reojax.mechanics._fast.quaternions import products_up_to, to_matrix
@@ -109,6 +110,5 @@ def _rotation_history(robot: Robot, waypoints: Array, samples: int, pattern: Pat
     return jnp.concatenate([jnp.eye(3, dtype=points.dtype)[None], jax.vmap(to_matrix)(ends)])
 
 
-def _as_arrays(robot: Robot, waypoints: Array) -> tuple[Robot, jax.Array]:
-    dtype = common_float(robot, waypoints)
-    return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), (robot, waypoints))
+def _as_arrays(robot: Robot, waypoints: Array) -> tuple[Robot, Any]:
+    return cast((robot, waypoints), common_float(robot, waypoints))

@@ -5,12 +5,11 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from reojax._internal import checks
-from reojax._internal.arrays import as_numbers, common_float, is_concrete
+from reojax._internal.arrays import as_numbers, cast, common_float, is_concrete
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -75,8 +74,7 @@ def check_motion(robot: Robot, **motion: Any) -> Any:
         if is_concrete(vector) and not np.isfinite(vector).all():
             raise ValueError(f"`{entry}` is {np.asarray(vector).tolist()}; it must be finite.")
     everything = (robot, *motion.values())
-    dtype = common_float(everything)
-    return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), everything)
+    return cast(everything, common_float(everything))
 
 
 def check_steps(entry: str, value: Any, least: int = 1) -> int:

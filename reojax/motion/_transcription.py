@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from reojax import so3
-from reojax._internal.arrays import Array
+from reojax._internal.arrays import Array, cast
 from reojax.collision.constraint import clearance_shortfall
 from reojax.mechanics.dynamics import joint_load
 from reojax.mechanics.integrators import GAUSS, end_rotation
@@ -78,7 +78,7 @@ class Transcription:
     def __init__(self, task: Task, box: UnknownBox) -> None:
         """Compile nothing yet; the functions are traced when they are called."""
         self.task, self.box = task, box
-        self.robot = jax.tree.map(lambda leaf: jnp.asarray(leaf, float), task.robot)
+        self.robot = cast(task.robot, float)
         self.motors = per_joint(task.motors, np.dtype(float))
         strongest = np.max(np.asarray(stall_torque(self.motors) * no_load_speed(self.motors)))
         self._soft = _SOFT * float(strongest)

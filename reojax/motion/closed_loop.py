@@ -24,7 +24,7 @@ from jaxtyping import Bool, Float, Int
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
-from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
+from reojax._internal.arrays import Array, as_numbers, cast, common_float, is_concrete
 from reojax._internal.result_text import printed_as
 from reojax.mechanics.dynamics import joint_load
 from reojax.mechanics.integrators import RK4, runge_kutta_step
@@ -211,9 +211,7 @@ def _track(
     substeps: int,
 ) -> Tracking:
     dtype = common_float(robot, trajectory, gains, momentum)
-    robot, model, trajectory, gains, momentum = jax.tree.map(
-        lambda leaf: jnp.asarray(leaf, dtype), (robot, model, trajectory, gains, momentum)
-    )
+    robot, model, trajectory, gains, momentum = cast((robot, model, trajectory, gains, momentum), dtype)
     motors = per_joint(motors, dtype)
     period = jnp.asarray(sample_time, dtype)
     time = period * jnp.arange(samples + 1, dtype=dtype)

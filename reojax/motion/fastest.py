@@ -7,14 +7,13 @@ held where it is wanted. Answers are local optima near their starts.
 
 from collections.abc import Sequence
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
-from reojax._internal.precision import in_double
+from reojax._internal.precision import as_double, in_double
 from reojax.collision.refusal import check_clearance
 from reojax.mechanics.holonomy import net_rotation
 from reojax.motion._optimal_control import Fastest as Fastest, least_duration
@@ -86,7 +85,7 @@ def overlap(
     high = np.concatenate([np.full(2 * count, 1.5 * total), np.full(joints, 2.0), [1.5 * total]])
     low[-1] = 0.2 * total
     scale = np.concatenate([np.full(2 * count, 0.2 * total), np.full(joints, 0.3), [total]])
-    goal = net_rotation(*_as_double(robot, path))
+    goal = net_rotation(*as_double((robot, path)))
     task = Task(robot, check_motors(motors, robot), goal, False, build, lambda x: x[-1], order, apart)
     return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
@@ -146,7 +145,7 @@ def free_law(
     high = np.concatenate([3 * durations, np.full(edges * points, 1.2)])
     scale = np.concatenate([0.5 * durations, np.full(edges * points, 0.3)])
     cost = lambda x: x[:edges].sum()
-    goal = net_rotation(*_as_double(robot, path))
+    goal = net_rotation(*as_double((robot, path)))
     task = Task(robot, check_motors(motors, robot), goal, True, build, cost, lambda x: x[:0], apart)
     return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
@@ -221,11 +220,6 @@ def _apart(robot: Robot, margin: float | None, postures: dict[str, np.ndarray]) 
     if margin is None:
         return None
     return Apart(*check_clearance(robot, margin, postures))
-
-
-def _as_double(robot: Robot, path: Path) -> tuple[Robot, Path]:
-    """Both in float64, whatever they were made of."""
-    return jax.tree.map(lambda leaf: np.array(leaf, float), (robot, path))
 
 
 def _check_moves(path: Path, entry: str = "path") -> None:

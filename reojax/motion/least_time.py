@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from reojax._internal import checks
-from reojax._internal.arrays import Array, common_float, is_concrete
+from reojax._internal.arrays import Array, cast, common_float, is_concrete
 from reojax._internal.result_text import printed_as
 from reojax.collision.refusal import require_clearance
 from reojax.mechanics.dynamics import joint_load
@@ -164,7 +164,7 @@ def minimum_stretch(
 def _instants(robot: Robot, trajectory: Trajectory, motors: Motor, samples: int) -> tuple[Array, Array]:
     """Least stretch for each instant and motor, (pieces, samples + 1, j), and the instants' times."""
     dtype = common_float(robot, trajectory, motors)
-    robot, trajectory = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), (robot, trajectory))
+    robot, trajectory = cast((robot, trajectory), dtype)
     motors = per_joint(motors, dtype)
     time, state = instants(trajectory, samples)
 

@@ -17,13 +17,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from reojax._internal import checks
-from reojax._internal.arrays import Array, as_numbers, is_concrete
+from reojax._internal.arrays import Array, as_numbers, cast, is_concrete
 from reojax.mechanics.dynamics import Load
 from reojax.robot import Robot
 
@@ -249,4 +248,4 @@ def _compare(field: str, motors: Array, robot: Array) -> None:
 
 def per_joint(motors: Motor, dtype: np.dtype) -> Motor:
     """Return the motors' numbers as JAX arrays of one dtype."""
-    return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), motors)
+    return cast(motors, dtype)

@@ -21,7 +21,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
-from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
+from reojax._internal.arrays import Array, as_numbers, cast, common_float, is_concrete
 from reojax.mechanics.integrators import RK4, runge_kutta_step
 from reojax.mechanics.kinematics import kinematics
 from reojax.mechanics.momentum import velocity_by_momentum
@@ -162,7 +162,7 @@ def check_release(robot: Robot, trajectory: Trajectory, release: Release) -> tup
             raise ValueError(f"release.{field} is {np.asarray(value).tolist()}; it must be finite.")
     dtype = common_float(robot, trajectory, *numbers.values())
     vector = jnp.concatenate([jnp.asarray(value, dtype).reshape(-1) for value in numbers.values()])
-    robot, trajectory = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), (robot, trajectory))
+    robot, trajectory = cast((robot, trajectory), dtype)
     return robot, trajectory, vector
 
 

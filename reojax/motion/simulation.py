@@ -18,7 +18,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
-from reojax._internal.arrays import Array, as_numbers, common_float, is_concrete
+from reojax._internal.arrays import Array, as_numbers, cast, common_float, is_concrete
 from reojax.mechanics.dynamics import Load, base_velocity, joint_load
 from reojax.mechanics.integrators import GAUSS, end_rotation, orientations, step_nodes
 from reojax.mechanics.kinematics import kinematics
@@ -179,7 +179,7 @@ def _simulate(
     robot: Robot, trajectory: Trajectory, momentum: Array, motors: Motor | None, samples: int, substeps: int
 ) -> tuple[Motion, Resolution]:
     dtype = common_float(robot, trajectory, momentum)
-    robot, trajectory, momentum = jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), (robot, trajectory, momentum))
+    robot, trajectory, momentum = cast((robot, trajectory, momentum), dtype)
     rotation, time, state, resolution = orientation_along(robot, trajectory, momentum, samples, substeps)
 
     def load_at(theta: Array, theta_dot: Array, theta_ddot: Array, turned: Array) -> Load:

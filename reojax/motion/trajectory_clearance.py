@@ -17,6 +17,7 @@ from jaxtyping import Float, Int
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array, is_concrete
+from reojax._internal.precision import as_double
 from reojax.collision.chains import geometry_of, moved_per_angle, structure_of, unit_axes
 from reojax.collision.clearance import clearance
 from reojax.collision.path_clearance import path_clearance
@@ -68,7 +69,7 @@ def trajectory_clearance(robot: Robot, trajectory: Trajectory, *, tolerance: flo
         raise ValueError("`trajectory` has numbers that are not finite.")
     powers = powers * length[:, None, None] ** np.arange(powers.shape[1])[None, :, None]  # of the share of a piece
     with jax.enable_x64(True):
-        robot = jax.tree.map(lambda leaf: np.array(leaf, float), robot)
+        robot = as_double(robot)
         geometry = unit_axes(geometry_of(robot), np.dtype(float))
         per_angle = np.asarray(moved_per_angle(structure_of(robot), geometry))
         begin, off = _stretches(powers, per_angle, near / 2)

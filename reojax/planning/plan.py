@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
+from reojax._internal.precision import as_double
 from reojax._internal.progress import label
 from reojax.collision.refusal import check_clearance
 from reojax.manoeuvres import Layout, fold_angles
@@ -148,7 +149,7 @@ def _plans(
     search = {"count": fewest, "travel": cheapest}[checks.one_of("objective", objective, OBJECTIVES)]
     letters = VOCABULARIES[checks.one_of("vocabulary", vocabulary, tuple(VOCABULARIES))]
     with jax.enable_x64(True):
-        robot = jax.tree.map(lambda leaf: np.asarray(leaf, float), robot)
+        robot = as_double(robot)
         wanted, clear = quaternions.from_matrices(targets), None
         if clearance is not None:
             rest = fold_angles(layout)

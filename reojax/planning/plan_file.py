@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from reojax._internal import checks
 from reojax._internal.files import check_ending, write_json
 from reojax._internal.json_files import entries, read_object
+from reojax._internal.precision import as_double
 from reojax._internal.version import version
 from reojax.mechanics.certificate import Certificate, certify
 from reojax.models.json_file import from_json, to_json
@@ -143,7 +144,7 @@ def _certificate(robot: Robot, waypoints: np.ndarray) -> dict[str, float] | None
     if not np.abs(np.diff(waypoints, axis=0)).any():
         return None
     with jax.enable_x64(True):
-        robot = jax.tree.map(lambda leaf: np.array(leaf, float), robot)
+        robot = as_double(robot)
         found = certify(robot, polygon(waypoints))
         return {name: float(value) for name, value in found._asdict().items()}
 
