@@ -60,6 +60,12 @@ class Candidates(NamedTuple):
         """Some of the rows."""
         return Candidates(*(field[..., keep] for field in self))
 
+    def with_slots(self, slots: int) -> "Candidates":
+        """The same words with unused slots at their ends."""
+        more = ((0, slots - len(self.letter)), (0, 0))
+        letter, runs = np.pad(self.letter, more, constant_values=-1), np.pad(self.runs, more, constant_values=1.0)
+        return self._replace(letter=letter, runs=runs, x=np.pad(self.x, ((0, 0), *more)))
+
 
 def context(robot: Robot, layout: Layout, box: AmplitudeBox) -> Context:
     """Compute what all plans of a robot within a box share."""
@@ -142,12 +148,12 @@ def _true_step(
 
 def starting_rows(owner: np.ndarray, starts: Starts) -> Candidates:
     """Rows of the starts (..., m, n) for targets `owner` (m,)."""
-    n = starts.distance.shape[1]
     slots = starts.letter.shape[0]
-    unused = min(size for size in SIZES if size >= slots) - slots
-    letter = np.pad(starts.letter.reshape(slots, -1), ((0, unused), (0, 0)), constant_values=-1)
-    x = np.pad(starts.x.reshape(len(starts.x), slots, letter.shape[1]), ((0, 0), (0, unused), (0, 0)))
-    return Candidates(np.repeat(owner, n), letter, np.ones(letter.shape), x, np.full(letter.shape[1], np.inf))
+    letter = starts.letter.reshape(slots, -1)
+    x = starts.x.reshape(len(starts.x), *letter.shape)
+    owner = np.repeat(owner, starts.distance.shape[1])
+    rows = Candidates(owner, letter, np.ones(letter.shape), x, np.full(letter.shape[1], np.inf))
+    return rows.with_slots(min(size for size in SIZES if size >= slots))
 
 
 def least(rows: Candidates, value: np.ndarray, keep: int = 1) -> Candidates:
@@ -194,6 +200,7 @@ def _pad(array: np.ndarray, size: int, value: float) -> np.ndarray:
 
 
 def join(parts: Sequence[Candidates]) -> Candidates:
-    """Rows of several answers, one after another, numbered anew."""
-    fields = [np.concatenate(field, axis=-1) for field in zip(*parts, strict=True)]
-    return Candidates(np.arange(fields[0].size), *fields[1:])
+    """Rows of several answers, one after another, words of any length."""
+    slots = max(len(part.letter) for part in parts)
+    fields = zip(*(part.with_slots(slots) for part in parts), strict=True)
+    return Candidates(*(np.concatenate(field, axis=-1) for field in fields))

@@ -78,14 +78,10 @@ class Answer:
         reaches, reached = rows.square <= self.tolerance**2, self.solved[rows.owner]
         better = (reaches & ~reached) | (~reached & (rows.square < now))
         better |= reaches & reached & (cost < self.travel[rows.owner])
-        owner, rows, cost = rows.owner[better], rows.take(better), cost[better]
-        slots = rows.letter.shape[0]
-        for field, value, blank in (("letter", rows.letter, -1), ("runs", rows.runs, 1.0), ("x", rows.x, 0.0)):
-            mine = getattr(self.rows, field)
-            mine[..., owner] = blank
-            mine[..., :slots, owner] = value
-        self.rows.square[owner] = rows.square
-        self.travel[owner] = cost
+        owner, rows = rows.owner[better], rows.take(better).with_slots(len(self.rows.letter))
+        for field in ("letter", "runs", "x", "square"):
+            getattr(self.rows, field)[..., owner] = getattr(rows, field)
+        self.travel[owner] = cost[better]
 
 
 def fewest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -> Answer:

@@ -23,6 +23,7 @@ from reojax.planning.freedom import Freedom, freedom_of
 from reojax.planning.polygon_table import table_of
 from reojax.planning.reach import Reach, reach_of
 from reojax.planning.repeats import MOST_REPEATS, least_repeats, repeated
+from reojax.planning.vocabulary import corners_as_value, first_of, no_violation, status_as_message, travel_as_cost
 from reojax.planning.words import box_of
 from reojax.robot import Robot
 
@@ -54,25 +55,14 @@ class FreePaths(NamedTuple):
     clearance: Any
     """Least distance of the robot's parts along the path, proven [m], (m,) of many; None if it was not asked for."""
 
-    @property
-    def value(self) -> Float[np.ndarray, "*m v j"]:
-        """The corners, under the name that all solvers' results have."""
-        return self.waypoints
-
-    @property
-    def cost(self) -> Float[np.ndarray, "*m"]:
-        """Joint travel [rad]."""
-        return self.travel
-
-    @property
-    def violation(self) -> Float[np.ndarray, "*m"]:
-        """How far a joint passes its limits [rad]: 0, as no answer ever leaves its box."""
-        return np.zeros_like(self.error)
-
-    @property
-    def message(self) -> Any:
-        """How it ended: `status`, under the name that all solvers' results have."""
-        return self.status
+    value = corners_as_value
+    """The corners, under the name that all solvers' results have."""
+    cost = travel_as_cost
+    """Joint travel [rad]."""
+    violation = no_violation
+    """How far a joint passes its limits [rad]: 0, as no answer ever leaves its box."""
+    message = status_as_message
+    """How it ended: `status`, under the name that all solvers' results have."""
 
     def __str__(self) -> str:
         """Corners, runs, and how the path ends; of many paths how many are reached."""
@@ -132,9 +122,7 @@ def free_path(
         seed=seed,
         progress=progress,
     )
-    one: dict[str, Any] = {name: None if field is None else field[0] for name, field in many._asdict().items()}
-    one["status"] = str(one["status"])
-    return FreePaths(**one)
+    return first_of(many)
 
 
 def free_paths(

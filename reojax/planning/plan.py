@@ -24,7 +24,7 @@ from reojax.planning.clear_boxes import clear_boxes
 from reojax.planning.clear_paths import Clear
 from reojax.planning.fewest import Answer, cheapest, fewest, rotation_from_folded
 from reojax.planning.reach import Reach
-from reojax.planning.result import Plan, first_of, plans
+from reojax.planning.result import Plan, first_plan, plans
 from reojax.planning.store import Store
 from reojax.planning.words import VOCABULARIES, box_of
 from reojax.robot import Robot
@@ -90,7 +90,7 @@ def plan(
     limits = {"twist_limit": twist_limit, "bend_limit": bend_limit, "max_manoeuvres": max_manoeuvres}
     choices = {"objective": objective, "vocabulary": vocabulary, "layout": layout, "tolerance": tolerance}
     choices["clearance"] = clearance
-    return first_of(_plans(robot, targets, **limits, **choices))
+    return first_plan(_plans(robot, targets, **limits, **choices))
 
 
 def plan_many(
@@ -172,7 +172,8 @@ def _solve(
         batch = seen[:, first : first + _BATCH]
         parts.append(search(scene, batch, most, tolerance).rows)
         bar.update(batch.shape[1])
-    found = plans(scene, join(parts), wanted, tolerance)
+    rows = join(parts)
+    found = plans(scene, rows._replace(owner=np.arange(len(rows.owner))), wanted, tolerance)
     return found if found.converged.all() else _explain(scene, found, seen, tolerance)
 
 

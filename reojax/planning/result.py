@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 from reojax.planning import quaternions
 from reojax.planning.candidates import Candidates, Context
 from reojax.planning.table import true_rotations
+from reojax.planning.vocabulary import corners_as_value, first_of, no_violation, status_as_message, travel_as_cost
 from reojax.planning.words import last_twist, word_corners
 
 
@@ -42,25 +43,14 @@ class Plan(NamedTuple):
     clearance: Any
     """Least distance of the robot's parts along the path, proven [m], (m,) of many; None if it was not asked for."""
 
-    @property
-    def value(self) -> Float[np.ndarray, "*m v j"]:
-        """The corners, under the name that all solvers' results have."""
-        return self.waypoints
-
-    @property
-    def cost(self) -> Float[np.ndarray, "*m"]:
-        """Joint travel [rad]."""
-        return self.travel
-
-    @property
-    def violation(self) -> Float[np.ndarray, "*m"]:
-        """How far a joint passes its limits [rad]: 0, as no answer ever leaves its box."""
-        return np.zeros_like(self.error)
-
-    @property
-    def message(self) -> Any:
-        """How it ended: `status`, under the name that all solvers' results have."""
-        return self.status
+    value = corners_as_value
+    """The corners, under the name that all solvers' results have."""
+    cost = travel_as_cost
+    """Joint travel [rad]."""
+    violation = no_violation
+    """How far a joint passes its limits [rad]: 0, as no answer ever leaves its box."""
+    message = status_as_message
+    """How it ended: `status`, under the name that all solvers' results have."""
 
     def __str__(self) -> str:
         """The word with its amplitudes, and how it ends; of many plans how many are reached."""
@@ -124,11 +114,10 @@ def status_of(converged: bool, error: float, manoeuvres: int) -> str:
     )
 
 
-def first_of(many: Plan) -> Plan:
+def first_plan(many: Plan) -> Plan:
     """Return the one plan of many."""
-    one: dict[str, Any] = {name: None if field is None else field[0] for name, field in many._asdict().items()}
-    one["word"], one["status"] = tuple(map(str, one["word"])), str(one["status"])
-    return Plan(**one)
+    one = first_of(many)
+    return one._replace(word=tuple(map(str, one.word)))
 
 
 def _stack(rows: Sequence[np.ndarray], fill: str | float | None) -> np.ndarray:

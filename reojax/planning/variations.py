@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from reojax.planning.candidates import Candidates, Context, attempt, rank_in_target
+from reojax.planning.candidates import Candidates, Context, attempt, join, rank_in_target
 
 _KEPT, _CHILDREN = 6, 16
 """Words kept from one generation to the next, and variations of each."""
@@ -33,13 +33,13 @@ _DONE = 1e-13
 
 def vary(context: Context, targets: np.ndarray, known: Sequence[Candidates], slots: int, most: int) -> Candidates:
     """The best few words of up to `slots` loops, repeated ones `most`, for each target that has rows in `known`."""
-    rows = _together(known)
+    rows = join(known)
     owners = np.unique(rows.owner)
     parts = []
     for first in range(0, len(owners), _TOGETHER):
         some = rows.take(np.isin(rows.owner, owners[first : first + _TOGETHER]))
         parts.append(_vary(context, targets, some, slots, most))
-    return _together(parts)
+    return join(parts)
 
 
 def _vary(context: Context, targets: np.ndarray, known: Candidates, slots: int, most: int) -> Candidates:
@@ -58,10 +58,10 @@ def _vary(context: Context, targets: np.ndarray, known: Candidates, slots: int, 
             break
         parents = best.take(np.flatnonzero(np.isin(best.owner, going)))
         children = attempt(context, targets, _variations(context, rng, parents, blank, most), bursts=1)
-        rows = _together([best, children])
+        rows = join([best, children])
         kept = _best_of(rows)
         fresh = kept >= len(best.owner)  # what is not among the best after the first steps is not solved further
-        best = _best(_together([rows.take(kept[~fresh]), attempt(context, targets, rows.take(kept[fresh]))]))
+        best = _best(join([rows.take(kept[~fresh]), attempt(context, targets, rows.take(kept[fresh]))]))
     return best
 
 
@@ -114,17 +114,3 @@ def _best_of(rows: Candidates) -> np.ndarray:
     alike = (np.diff(owner) == 0) & (np.diff(square) < _ALIKE * square[1:]) & (square[1:] > _DONE)
     order = order[~np.concatenate([[False], alike])]
     return order[rank_in_target(rows.owner[order]) < _KEPT]
-
-
-def _together(parts: Sequence[Candidates]) -> Candidates:
-    """Rows of several answers, words of any length."""
-    slots = max(len(part.letter) for part in parts)
-    parts = [_with_slots(part, slots) for part in parts]
-    return Candidates(*(np.concatenate(field, axis=-1) for field in zip(*parts, strict=True)))
-
-
-def _with_slots(rows: Candidates, slots: int) -> Candidates:
-    """The same words with unused slots at their ends."""
-    more = ((0, slots - len(rows.letter)), (0, 0))
-    letter, runs = np.pad(rows.letter, more, constant_values=-1), np.pad(rows.runs, more, constant_values=1.0)
-    return rows._replace(letter=letter, runs=runs, x=np.pad(rows.x, ((0, 0), *more)))
