@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from reojax._internal.precision import as_double
 from reojax.collision.chains import geometry_of, structure_of, unit_axes
 from reojax.collision.clearance import pair_name, without_pairs
 from reojax.collision.path_clearance import path_clearance, posture_at
@@ -55,7 +56,7 @@ def nearest_parts(robot: Robot, path: Path, *, tolerance: float = 1e-4) -> Neare
     if not robot.collision_pairs:
         raise ValueError(without_pairs(robot))
     with jax.enable_x64(True):
-        robot, path = jax.tree.map(lambda leaf: np.array(leaf, float), (robot, path))
+        robot, path = as_double((robot, path))
         least = path_clearance(robot, path, tolerance=tolerance)
         theta = np.asarray(posture_at(path.waypoints, least.at), float)
         pair = int(least.pair)

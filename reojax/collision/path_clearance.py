@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array, common_float, is_concrete
-from reojax.collision.bounds import edges_of, interval_bounds
+from reojax.collision.bounds import Edges, edges_of, interval_bounds
 from reojax.collision.chains import Geometry, Structure, geometry_of, structure_of, unit_axes
 from reojax.collision.clearance import radii
 from reojax.collision.placement import pair_ends
@@ -154,66 +154,90 @@ def _search(
 ) -> PathClearance:
     edges = edges_of(structure, geometry, waypoints)
     tolerance = jnp.maximum(tolerance, 4 * edges.rounding.max())
-    count = edges.start.shape[1]
-    cells = max(1, min(_CELLS // count, _MOST_CELLS))
+    cells = max(1, min(_CELLS // edges.start.shape[1], _MOST_CELLS))
 
     def goal(least: Array) -> jax.Array:
         """Bound that is good enough everywhere."""
         return jnp.where(least < enough, -jnp.inf, jnp.minimum(least - tolerance, margin))
 
-    share = jnp.arange(cells + 1, dtype=waypoints.dtype) / cells
-    theta = edges.start[:, :, None] + edges.turn[:, :, None] * share[None, None]
-    width = jnp.full((count, cells), 1 / cells, waypoints.dtype)
-    lower, sampled = interval_bounds(structure, geometry, theta, width, edges.bend, edges.rounding)
-    place = jnp.arange(count, dtype=waypoints.dtype)[:, None] + share[None]
-    low = lower.min(0).reshape(-1)
-    done, proven, step = (jnp.full((), x, low.dtype) for x in (0, jnp.inf, 1 / _STEPS))
-    first = _Search(low, _least(sampled, place), low.argmin(), done, proven, step, jnp.zeros((), int))
-
     def going(search: _Search) -> jax.Array:
         return (search.low.min() < goal(search.best.found)) & (search.rounds < _LONGEST)
 
     def advance(search: _Search) -> _Search:
-        edge, inside = search.cell // cells, (search.cell % cells).astype(low.dtype)
-        ahead = jnp.minimum(search.done + search.step * jnp.arange(_STEPS + 1, dtype=low.dtype), 1)
-        share = (inside + ahead) / cells
-        theta = edges.start[:, edge, None] + edges.turn[:, edge, None] * share[None]
-        lower, sampled = interval_bounds(
-            structure,
-            geometry,
-            theta[:, None],
-            (share[1:] - share[:-1])[None],
-            edges.bend[:, edge, None],
-            edges.rounding,
+        seen = _look_ahead(structure, geometry, edges, cells, search)
+        best = jax.tree.map(
+            lambda new, old: jnp.where(seen.least.found < search.best.found, new, old), seen.least, search.best
         )
-        here = _least(sampled, (edge.astype(low.dtype) + share)[None])
-        best = jax.tree.map(lambda new, old: jnp.where(here.found < search.best.found, new, old), here, search.best)
-        bound, nearest = lower.min((0, 1)), sampled.min((0, 1))
-        wanted = goal(best.found)
-        good = (bound >= wanted) | (search.step <= _FINEST)
-        run = jnp.cumprod(good.astype(int)).sum()  # intervals proven one after another
-        proven = jnp.minimum(search.proven, jnp.where(jnp.arange(_STEPS) < run, bound, jnp.inf).min())
-        done = search.done + run * search.step
-        # the bound falls short by some h^2: the step with which the next one just does
-        least = jnp.minimum(nearest[1:], nearest[:-1])
-        short = jnp.maximum(least - bound, jnp.finfo(low.dtype).tiny)
-        room = jnp.sqrt(jnp.maximum(least - wanted, 0) / short)
-        room = jnp.where(run == _STEPS, room.min(), room[jnp.minimum(run, _STEPS - 1)])
-        step = jnp.maximum(search.step * jnp.clip(0.9 * room, 0.1, 4), _FINEST)
-        through = done >= 1
-        low_now = search.low.at[search.cell].set(jnp.where(through, proven, search.low[search.cell]))
-        return _Search(
-            low_now,
-            best,
-            jnp.where(through, low_now.argmin(), search.cell),
-            jnp.where(through, 0, done),
-            jnp.where(through, jnp.inf, proven),
-            jnp.where(through, 1 / _STEPS, step),
-            search.rounds + 1,
-        )
+        return _advance(search._replace(best=best), seen, goal(best.found))
 
-    last = jax.lax.while_loop(going, advance, first)
+    last = jax.lax.while_loop(going, advance, _look_at_all(structure, geometry, edges, cells))
     return last.best._replace(distance=last.low.min(), at=jnp.minimum(last.best.at, waypoints.shape[0] - 1))
+
+
+def _look_at_all(structure: Structure, geometry: Geometry, edges: Edges, cells: int) -> _Search:
+    """The search at its beginning: a bound for each of the `cells` of every edge, and the least sample between them."""
+    count, dtype = edges.start.shape[1], edges.start.dtype
+    share = jnp.arange(cells + 1, dtype=dtype) / cells
+    theta = edges.start[:, :, None] + edges.turn[:, :, None] * share[None, None]
+    width = jnp.full((count, cells), 1 / cells, dtype)
+    lower, sampled = interval_bounds(structure, geometry, theta, width, edges.bend, edges.rounding)
+    place = jnp.arange(count, dtype=dtype)[:, None] + share[None]
+    low = lower.min(0).reshape(-1)
+    done, proven, step = (jnp.full((), x, low.dtype) for x in (0, jnp.inf, 1 / _STEPS))
+    return _Search(low, _least(sampled, place), low.argmin(), done, proven, step, jnp.zeros((), int))
+
+
+class _Seen(NamedTuple):
+    """What the next intervals of a cell are like."""
+
+    least: PathClearance
+    """The least of their samples."""
+    bound: jax.Array
+    """(i,) proven bound of each interval, over all pairs."""
+    nearest: jax.Array
+    """(i + 1,) least sample at each end."""
+
+
+def _look_ahead(structure: Structure, geometry: Geometry, edges: Edges, cells: int, search: _Search) -> _Seen:
+    """The next `_STEPS` intervals of the present cell."""
+    dtype = search.low.dtype
+    edge, inside = search.cell // cells, (search.cell % cells).astype(dtype)
+    ahead = jnp.minimum(search.done + search.step * jnp.arange(_STEPS + 1, dtype=dtype), 1)
+    share = (inside + ahead) / cells
+    theta = edges.start[:, edge, None] + edges.turn[:, edge, None] * share[None]
+    width = (share[1:] - share[:-1])[None]
+    bend = edges.bend[:, edge, None]
+    lower, sampled = interval_bounds(structure, geometry, theta[:, None], width, bend, edges.rounding)
+    least = _least(sampled, (edge.astype(dtype) + share)[None])
+    return _Seen(least, lower.min((0, 1)), sampled.min((0, 1)))
+
+
+def _advance(search: _Search, seen: _Seen, wanted: jax.Array) -> _Search:
+    """Go over the intervals whose bound is good enough, choose the next step, and the next cell if this one is done."""
+    dtype = search.low.dtype
+    # intervals proven one after another
+    good = (seen.bound >= wanted) | (search.step <= _FINEST)
+    run = jnp.cumprod(good.astype(int)).sum()
+    proven = jnp.minimum(search.proven, jnp.where(jnp.arange(_STEPS) < run, seen.bound, jnp.inf).min())
+    done = search.done + run * search.step
+    # the bound falls short by some h^2: the step with which the next one just does
+    least = jnp.minimum(seen.nearest[1:], seen.nearest[:-1])
+    short = jnp.maximum(least - seen.bound, jnp.finfo(dtype).tiny)
+    room = jnp.sqrt(jnp.maximum(least - wanted, 0) / short)
+    room = jnp.where(run == _STEPS, room.min(), room[jnp.minimum(run, _STEPS - 1)])
+    step = jnp.maximum(search.step * jnp.clip(0.9 * room, 0.1, 4), _FINEST)
+    # through with this cell: on to the one of least bound
+    through = done >= 1
+    low = search.low.at[search.cell].set(jnp.where(through, proven, search.low[search.cell]))
+    return _Search(
+        low,
+        search.best,
+        jnp.where(through, low.argmin(), search.cell),
+        jnp.where(through, 0, done),
+        jnp.where(through, jnp.inf, proven),
+        jnp.where(through, 1 / _STEPS, step),
+        search.rounds + 1,
+    )
 
 
 def _least(sampled: Float[jax.Array, "p c k"], place: Float[jax.Array, "c k"]) -> PathClearance:

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
+from reojax._internal.precision import as_double
 from reojax.collision.refusal import check_clearance
 from reojax.planning import quaternions
 from reojax.planning.checks import a_robot, key_of
@@ -85,7 +86,7 @@ def farthest_turn(
     freedom = freedom_of(robot, start=start, end=None, joints=joints, lower=lower, upper=upper)
     count = corners_for(len(freedom.joints)) if corners is None else checks.whole("corners", corners, 2)
     with jax.enable_x64(True):
-        robot = jax.tree.map(lambda leaf: np.array(leaf, float), robot)
+        robot = as_double(robot)
         clear = None
         if clearance is not None:
             clear = Clear(robot, *check_clearance(robot, clearance, {"the posture at the start": freedom.start}))

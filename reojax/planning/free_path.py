@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array
+from reojax._internal.precision import as_double
 from reojax.collision.refusal import check_clearance
 from reojax.manoeuvres import Layout, fold_angles
 from reojax.planning import quaternions
@@ -205,7 +206,7 @@ def free_paths(
         raise ValueError(f"`repeats` is {repeats!r} and `end` is not `start`; only a closed path can be run again.")
 
     with jax.enable_x64(True):
-        robot = jax.tree.map(lambda leaf: np.array(leaf, float), robot)
+        robot = as_double(robot)
         clear = None
         if clearance is not None:
             postures = {"the posture at the start": freedom.start, "the posture at the end": freedom.end}
