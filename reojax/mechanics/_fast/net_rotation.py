@@ -146,7 +146,6 @@ def _steps_of_path(problem: RotationProblem, numbers: jax.Array, points: jax.Arr
         theta, rate = path_nodes(points, problem.steps)
         base = inward(problem.robot(split(numbers)), [sincos(a) for a in theta], rate)
         like = theta[0]
-    # A omega = -L, thesis eq. 2.14
     return step_rotations(materialize(_at_nodes(solve(base.inertia, scale(-1, base.momentum)), like)))
 
 
