@@ -63,7 +63,7 @@ def farthest_turn(
             [m]; default not asked. The posture at the start must have it.
         corners: number of free corners, at least 2; default as for `free_path`.
         starts: polygons to start from; with a clearance those that are clear come first.
-        tolerance: angle besides the turn about the axis that is allowed [rad].
+        tolerance: angle besides the turn about the axis up to which it counts as reached [rad].
         max_steps: most steps of the solver.
         seed: of the random polygons.
         progress: whether to show a bar on stderr, or what to write before it.
