@@ -40,7 +40,8 @@ from reojax.motion.trajectory import Trajectory, along, through
 from reojax.motion.trajectory_clearance import TrajectoryClearance, trajectory_clearance
 from reojax.path import Path, joint_travel, polygon
 from reojax.planning.farthest_turn import farthest_turn
-from reojax.planning.free_path import FreePaths, free_path, free_paths
+from reojax.planning.free_path import free_path, free_paths
+from reojax.planning.free_paths_result import FreePaths
 from reojax.planning.plan import plan, plan_many, replan
 from reojax.planning.plan_file import SavedPlan, load_plan, save_plan
 from reojax.planning.result import Plan

@@ -14,7 +14,7 @@ from reojax.motion.simulation import Motion
 from reojax.motion.time_laws import Law
 from reojax.motion.trajectory import Trajectory, along
 from reojax.path import Path, polygon
-from reojax.planning.free_path import FreePaths
+from reojax.planning.free_paths_result import FreePaths
 from reojax.planning.plan_file import SavedPlan, repeated
 from reojax.planning.result import Plan
 

@@ -15,7 +15,8 @@ from reojax.collision.refusal import check_clearance
 from reojax.planning import quaternions
 from reojax.planning.checks import a_robot, key_of
 from reojax.planning.clear_paths import Clear
-from reojax.planning.free_path import FreePaths, corners_for
+from reojax.planning.free_path import corners_for
+from reojax.planning.free_paths_result import FreePaths
 from reojax.planning.free_polygons import Polygons, polygons_of
 from reojax.planning.free_search import Search, apart
 from reojax.planning.freedom import Freedom, freedom_of

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import jax
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
@@ -16,15 +16,16 @@ from reojax._internal.precision import as_double
 from reojax.collision.refusal import check_clearance
 from reojax.manoeuvres import Layout, fold_angles
 from reojax.planning import quaternions
+from reojax.planning.answers import first_of
 from reojax.planning.checks import a_robot, key_of, robot_and_layout
 from reojax.planning.clear_paths import Clear
+from reojax.planning.free_paths_result import FreePaths, outcome
 from reojax.planning.free_polygons import polygons_of
 from reojax.planning.free_search import Search, apart
 from reojax.planning.freedom import Freedom, freedom_of
 from reojax.planning.polygon_table import table_of
-from reojax.planning.reach import Reach, reach_of
+from reojax.planning.reach import reach_of
 from reojax.planning.repeats import MOST_REPEATS, least_repeats, repeated
-from reojax.planning.vocabulary import corners_as_value, first_of, no_violation, status_as_message, travel_as_cost
 from reojax.planning.words import box_of
 from reojax.robot import Robot
 
@@ -34,44 +35,6 @@ variables as joints move, and robots of many joints have loops enough of few cor
 
 _AGAIN = 3
 """How often more clearance is asked for at the samples, where the path between them comes too near."""
-
-
-class FreePaths(NamedTuple):
-    """Polygons, one for each target; of `free_path` one, without the leading axis."""
-
-    waypoints: Float[np.ndarray, "*m v j"]
-    """Corners of the joint path of one run [rad], from `start` to `end`, for `polygon`."""
-    rotation: Float[np.ndarray, "*m 3 3"]
-    """Rotation of the base after all runs."""
-    error: Float[np.ndarray, "*m"]
-    """Angle left to the target [rad]."""
-    travel: Float[np.ndarray, "*m"]
-    """Sum over all joints of the angle each one moves through, in all runs [rad]."""
-    repeats: Int[np.ndarray, "*m"]
-    """How often the path is run."""
-    converged: Bool[np.ndarray, "*m"]
-    """Whether `error` is within the tolerance; the travel is then the least found, not proven to be the least."""
-    status: Any
-    """In words: converged; not found, which proves nothing; or unreachable in principle, and why. (m,) of many."""
-    clearance: Any
-    """Least distance of the robot's parts along the path, proven [m], (m,) of many; None if it was not asked for."""
-
-    value = corners_as_value
-    """The corners, under the name that all solvers' results have."""
-    cost = travel_as_cost
-    """Joint travel [rad]."""
-    violation = no_violation
-    """How far a joint passes its limits [rad]: 0, as no answer ever leaves its box."""
-    message = status_as_message
-    """How it ended: `status`, under the name that all solvers' results have."""
-
-    def __str__(self) -> str:
-        """Corners, runs, and how the path ends; of many paths how many are reached."""
-        if np.ndim(self.error):
-            return f"{len(self.error)} paths, {int(np.sum(self.converged))} of them reach their targets"
-        runs = f"{self.repeats} runs" if self.repeats > 1 else "one run"
-        figures = f"error {self.error:.1e} rad, joint travel {np.rad2deg(self.travel):.1f} deg"
-        return f"path of {len(self.waypoints)} corners, {runs}: {figures}; {self.status}"
 
 
 def free_path(
@@ -271,7 +234,7 @@ def _solve(
         travel=np.abs(np.diff(paths, axis=1)).sum((1, 2)) * runs,
         repeats=runs,
         converged=(error <= tolerance) & kept,
-        status=np.array([_status(*row, tolerance, reach) for row in zip(error, beyond, kept, strict=True)]),
+        status=np.array([outcome(*row, tolerance, reach) for row in zip(error, beyond, kept, strict=True)]),
         clearance=proven,
     )
 
@@ -292,22 +255,6 @@ def _clear_again(search: Search, x: np.ndarray, runs: np.ndarray, targets: np.nd
             return
         search.spare = 2 * search.spare + 1e-4
         x[near] = repeated(search, targets[near], runs[near], x[near][:, None])
-
-
-def _status(error: float, beyond: float, kept: bool, tolerance: float, reach: Reach) -> str:
-    if not kept:
-        return (
-            "not found: the closest path does not keep the clearance, which proves nothing; more starts or corners, "
-            "wider limits, or less clearance, may reach it"
-        )
-    if error <= tolerance:
-        return "converged"
-    if beyond > tolerance:
-        return f"unreachable: {reach.explain()}; {np.rad2deg(beyond):.6g} deg are left at the least"
-    return (
-        f"not found: the closest path leaves {np.rad2deg(error):.6g} deg, which proves nothing; more repeats, corners "
-        "or starts, or wider limits, may reach it"
-    )
 
 
 def _fold_rotation(polygons: Any, before: np.ndarray, corners: int) -> np.ndarray:

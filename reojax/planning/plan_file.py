@@ -20,7 +20,7 @@ from reojax.models.json_file import from_json, to_json
 from reojax.path import Path, polygon
 from reojax.planning import quaternions
 from reojax.planning.checks import a_robot
-from reojax.planning.free_path import FreePaths
+from reojax.planning.free_paths_result import FreePaths
 from reojax.planning.repeats import MOST_REPEATS
 from reojax.planning.result import Plan
 from reojax.robot import Robot

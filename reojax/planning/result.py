@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from reojax.planning import quaternions
+from reojax.planning.answers import corners_as_value, first_of, no_violation, status_as_message, travel_as_cost
 from reojax.planning.candidates import Candidates, Context
 from reojax.planning.table import true_rotations
-from reojax.planning.vocabulary import corners_as_value, first_of, no_violation, status_as_message, travel_as_cost
 from reojax.planning.words import last_twist, word_corners
 
 

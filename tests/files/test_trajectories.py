@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 from reojax import along, manoeuvre_a, net_rotation, polygon, read_capture, robots, simulate
 from reojax.cli import main
 from reojax.files.trajectories import check_trajectory, write_trajectory
-from reojax.planning.free_path import FreePaths
+from reojax.planning.free_paths_result import FreePaths
 from reojax.planning.plan_file import load_plan, save_plan
 from reojax.planning.result import Plan
 
