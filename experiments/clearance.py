@@ -1,7 +1,7 @@
 """What does staying clear of itself cost a robot? Maps of contact, single targets, many targets, and an arm on a bus.
 
     python experiments/clearance.py             # everything
-    python experiments/clearance.py --quick     # coarser maps, one free path, few targets, no arm, no overhead
+    python experiments/clearance.py --quick     # coarser maps, few targets, words alone; no arm, no overhead
     python experiments/clearance.py --part map  # or targets, many, arm, overhead: one part alone
 
 1. `map`: least clearance of manoeuvres A and B of the prototype over twist within 270 and bend within 120 degrees.
@@ -73,7 +73,7 @@ def targets(quick: bool) -> list[dict]:
     for name, vector in (("roll 180", [0, 0, np.pi]), ("pitch 90", [np.pi / 2, 0, 0]))[: 1 if quick else 2]:
         turn = np.asarray(so3.exp(np.array(vector, float)))
         for margin in (MARGIN,) if quick else (None, MARGIN):
-            for kind in ("free",) if quick else ("word", "free"):  # `many` plans words
+            for kind in ("word",) if quick else ("word", "free"):
                 if kind == "word":
                     found = reojax.plan(ROBOT, turn, **LIMITS, max_manoeuvres=5, objective="travel", clearance=margin)
                 else:
