@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -17,7 +18,7 @@ from reojax._internal.arrays import Array, as_numbers
 from reojax.collision.path_clearance import least_clearance
 from reojax.design.loops import Loops
 from reojax.design.outcome import Measure, Outcome
-from reojax.design.self_clearance import ClearBy, prove, share_of
+from reojax.design.self_clearance import ClearBy, solve_proven
 from reojax.design.solutions import Solutions
 from reojax.design.variables import Space, Variable, neighbours
 from reojax.mechanics.holonomy import DEFAULT_STEPS
@@ -282,19 +283,9 @@ class Problem:
                 **limits._asdict(),
             )
 
-        every = np.arange(len(x))
         if not self._clear:
-            return run((self.cost, self._equality, self._inequality), x, every, None)
-
-        def tightened(x: np.ndarray, rows: np.ndarray, level: int) -> Solution:
-            """As many rows at any level, for one program serves them all; those that fill them up end at once."""
-            fill = np.minimum(every, len(rows) - 1)
-            share = np.where(every < len(rows), share_of(level), np.nan)
-            found = run(self._tightened, x[fill], rows[fill], share)
-            fields = {name: value[: len(rows)] for name, value in found._asdict().items() if name != "best"}
-            return Solution(**fields, best=0)
-
-        return prove(tightened(x, every, 0), tightened, self._kept)
+            return run((self.cost, self._equality, self._inequality), x, np.arange(len(x)), None)
+        return solve_proven(x, partial(run, self._tightened), self._kept)
 
     def _kept(self, x: Float[np.ndarray, "m n"]) -> Bool[np.ndarray, " m"]:
         """Which designs are proven to keep their clearance along their whole loops."""

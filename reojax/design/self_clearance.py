@@ -55,20 +55,30 @@ def share_of(level: int) -> float:
     return 3.0 ** (level - 1) if level else 0.0
 
 
-def prove(
-    found: Solution,
-    run: Callable[[np.ndarray, np.ndarray, int], Solution],
+def solve_proven(
+    x: np.ndarray,
+    run: Callable[[np.ndarray, np.ndarray, np.ndarray], Solution],
     kept: Callable[[np.ndarray], np.ndarray],
 ) -> Solution:
-    """Prove the clearance of all answers that have converged, and mend those that fall short.
+    """Solve, prove the clearance of all answers that have converged, and mend those that fall short.
 
     These are solved again, each from where it is, with more asked for; one that still falls short has not converged.
 
     Args:
-        found: the answers.
-        run: solves from points (r, n) those of the starts with numbers (r,), the condition tightened to a level.
+        x: the starts (m, n).
+        run: solves from points (m, n) those of the starts with numbers (m,), tightened by shares (m,), see `share_of`.
         kept: which of some points (r, n) are proven to keep the clearance.
     """
+    every = np.arange(len(x))
+
+    def tightened(x: np.ndarray, rows: np.ndarray, level: int) -> Solution:
+        """As many rows at any level, for one program serves them all; those that fill them up end at once."""
+        fill = np.minimum(every, len(rows) - 1)
+        found = run(x[fill], rows[fill], np.where(every < len(rows), share_of(level), np.nan))
+        fields = {name: value[: len(rows)] for name, value in found._asdict().items() if name != "best"}
+        return Solution(**fields, best=0)
+
+    found = tightened(x, every, 0)
     fields = {name: np.array(value) for name, value in found._asdict().items() if name != "best"}
     short = np.flatnonzero(found.converged)
     for level in range(1, TIGHTENED + 2):
@@ -78,7 +88,7 @@ def prove(
         if level > TIGHTENED:
             fields["converged"][short], fields["status"][short] = False, Status.NOT_FOUND
             break
-        again, before = run(fields["value"][short], short, level), fields["steps"][short]
+        again, before = tightened(fields["value"][short], short, level), fields["steps"][short]
         for name, value in fields.items():
             value[short] = getattr(again, name)
         fields["steps"][short] += before
