@@ -64,7 +64,7 @@ def unit_quaternion(r: jax.Array) -> jax.Array:
 def scale_to_one(vector: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Return `vector / scale` and `scale`: its largest component, or 1 at zero; a constant to autodiff."""
     scale = lax.stop_gradient(jnp.max(jnp.abs(vector)))
-    scale = jnp.where(scale > jnp.finfo(vector.dtype).tiny, scale, 1.0)
+    scale = jnp.where(scale >= jnp.finfo(vector.dtype).tiny, scale, 1.0)
     return vector / scale, scale
 
 

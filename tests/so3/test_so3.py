@@ -138,6 +138,7 @@ def test_quaternion_of_any_length_is_normalised():
     q = np.array([0.5, -0.5, 0.1, 0.7])
     for scale in (1e-300, 1e-160, 1e-5, -1.0, 1e5, 1e160, 1e300):
         close(from_quaternion(scale * q), from_quaternion(q))
+    close(from_quaternion(np.array([np.finfo(float).tiny, 0, 0, 0])), np.eye(3))  # the smallest normal number
 
 
 @laws
