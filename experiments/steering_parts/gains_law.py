@@ -17,7 +17,7 @@ _MEMORY = 32
 
 
 class GainsState(NamedTuple):
-    """As `onboard.State`; `estimate` is empty."""
+    """As `onboard.OnboardState`; `estimate` is empty."""
 
     time: Array
     steer: Array
@@ -31,7 +31,7 @@ class GainsState(NamedTuple):
 
 
 class GainsLaw:
-    """`onboard.Law` with the same `start` and `update` as a `SteeringLaw`."""
+    """`onboard.OnboardLaw` with the same `start` and `update` as a `SteeringLaw`."""
 
     def __init__(self, robot: reojax.Robot, plan: reojax.Trajectory, *, settle: float, left: float):
         table = gain_table(reojax.correction_gains(robot, plan, samples=32, left=left))
@@ -46,7 +46,7 @@ class GainsLaw:
         return GainsState(zero, three, three, three, zero, jnp.zeros((_MEMORY, 4)), three, zero, jnp.zeros(0))
 
     def update(self, state: GainsState, reading: Reading) -> tuple[GainsState, References]:
-        """`onboard.Law.step`."""
+        """`onboard.OnboardLaw.step`."""
         time, _, seen, taken = (jnp.asarray(x, float) for x in reading)
         now, steer = row_at(self.table, time), state.steer
         comes = jnp.isfinite(seen).all()

@@ -53,7 +53,7 @@ _LEAST_TRAVEL = 10
 """Starts of least travel among the nearest ones, when travel counts."""
 
 
-class Answer:
+class BestWords:
     """The best word so far for each of m targets: solved before not, then by what counts."""
 
     def __init__(self, scene: Context, targets: np.ndarray, tolerance: float):
@@ -84,9 +84,9 @@ class Answer:
         self.travel[owner] = cost[better]
 
 
-def fewest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -> Answer:
+def fewest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -> BestWords:
     """Words of the fewest loops, up to `most`, and of these of least travel, for targets (4, m)."""
-    answer = Answer(scene, targets, tolerance)
+    answer = BestWords(scene, targets, tolerance)
     longest = min(most, LONGEST)
     for slots in range(1, longest + 1):
         _with_loops(scene, targets, answer, slots)
@@ -96,7 +96,7 @@ def fewest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -> 
     return answer
 
 
-def _with_loops(scene: Context, targets: np.ndarray, answer: Answer, slots: int) -> None:
+def _with_loops(scene: Context, targets: np.ndarray, answer: BestWords, slots: int) -> None:
     """Try words of `slots` loops for what is not reached yet, where there is hope."""
     waiting = np.flatnonzero(~answer.solved)
     if len(waiting):
@@ -111,7 +111,7 @@ def _with_loops(scene: Context, targets: np.ndarray, answer: Answer, slots: int)
         closest[trying] = found.square.reshape(-1, last - first).min(1)
 
 
-def _with_what_is_left(scene: Context, targets: np.ndarray, answer: Answer, slots: int, most: int) -> None:
+def _with_what_is_left(scene: Context, targets: np.ndarray, answer: BestWords, slots: int, most: int) -> None:
     """Try what there is still to try: more starts, however far off others ended, then variations of the best words."""
     known = []
     for kind, first, last in _LAST_FEW_ROUNDS if slots in _CLOSE_FEW else _LAST_ROUNDS:
@@ -127,7 +127,7 @@ def _with_what_is_left(scene: Context, targets: np.ndarray, answer: Answer, slot
 
 
 def _try(
-    scene: Context, targets: np.ndarray, answer: Answer, slots: int, owner: np.ndarray, starts: Starts, first: int
+    scene: Context, targets: np.ndarray, answer: BestWords, slots: int, owner: np.ndarray, starts: Starts, first: int
 ) -> Candidates:
     """Solve the starts from the `first` one for the targets `owner`, and take the best."""
     some = Starts(*(field[..., first:] for field in starts))
@@ -139,7 +139,7 @@ def _try(
 
 
 def _update(
-    scene: Context, targets: np.ndarray, answer: Answer, found: Candidates, keep: int, close: float = _CLOSE
+    scene: Context, targets: np.ndarray, answer: BestWords, found: Candidates, keep: int, close: float = _CLOSE
 ) -> None:
     """Take the best of rows solved on the table; of those on the target, `keep` of least travel are settled."""
     missed = found.take(found.square >= close)
@@ -157,7 +157,7 @@ def _continue_search(scene: Context, targets: np.ndarray, found: Candidates) -> 
     return found
 
 
-def cheapest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -> Answer:
+def cheapest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -> BestWords:
     """Words of least travel, of up to `most` loops; never more than those of the fewest loops."""
     answer = fewest(scene, targets, min(most, LONGEST), tolerance)
     waiting = np.flatnonzero((answer.travel > 0) | ~answer.solved)
@@ -173,7 +173,7 @@ def cheapest(scene: Context, targets: np.ndarray, most: int, tolerance: float) -
 
 
 def _with_small_loops(
-    scene: Context, targets: np.ndarray, most: int, answer: Answer, value: Callable[[Candidates], np.ndarray]
+    scene: Context, targets: np.ndarray, most: int, answer: BestWords, value: Callable[[Candidates], np.ndarray]
 ) -> None:
     """Try words of many equal loops where nothing else reached the target; of the solved ones the least `value`."""
     found = attempt(scene, targets, group_rows(scene, targets, np.flatnonzero(~answer.solved), most))
@@ -188,7 +188,9 @@ def _with_small_loops(
         answer.update_best(least(rows, off + 1e3 * value(rows) + travel(scene.box, rows)))
 
 
-def _update_from_solutions(scene: Context, targets: np.ndarray, answer: Answer, found: Candidates, keep: int) -> None:
+def _update_from_solutions(
+    scene: Context, targets: np.ndarray, answer: BestWords, found: Candidates, keep: int
+) -> None:
     """Shorten what reaches the target on the table, and solve it on the true rotations."""
     value = travel(scene.box, found) + np.where(found.square > _EXACT, 1e3, 0.0)
     short = shorten_candidates(scene, targets, least(found, value, keep))

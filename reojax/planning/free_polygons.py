@@ -21,9 +21,9 @@ from reojax._internal.arrays import Array
 from reojax.collision.constraint import clearance_shortfall
 from reojax.mechanics.holonomy import net_rotation
 from reojax.path import Path
+from reojax.planning.cache import Cache
 from reojax.planning.checks import key_of
 from reojax.planning.freedom import Freedom
-from reojax.planning.store import Store
 from reojax.robot import Robot
 
 COARSE, FINE = 2, 8
@@ -89,7 +89,7 @@ class Polygons(NamedTuple):
         return np.concatenate(found)[: len(paths)] if found else np.zeros((0, 3, 3))
 
 
-_polygons: Store[Polygons] = Store(_KEPT)
+_polygons: Cache[Polygons] = Cache(_KEPT)
 
 
 def polygons_of(robot: Robot, freedom: Freedom, corners: int) -> Polygons:

@@ -18,14 +18,14 @@ from reojax.collision.refusal import check_clearance
 from reojax.manoeuvres import Layout, fold_angles
 from reojax.mechanics.controllable import controllable_directions
 from reojax.planning import quaternions
+from reojax.planning.cache import Cache
 from reojax.planning.candidates import Context, context, join
 from reojax.planning.checks import OBJECTIVES, key_of, robot_and_layout
 from reojax.planning.clear_boxes import clear_boxes
 from reojax.planning.clear_paths import Clear
-from reojax.planning.fewest import Answer, cheapest, fewest, rotation_from_folded
+from reojax.planning.fewest import BestWords, cheapest, fewest, rotation_from_folded
 from reojax.planning.reach import Reach
 from reojax.planning.result import Plan, first_plan, plans
-from reojax.planning.store import Store
 from reojax.planning.words import VOCABULARIES, box_of
 from reojax.robot import Robot
 
@@ -42,7 +42,7 @@ _TOO_NEAR = (
     "not found: the plan does not keep the clearance, which proves nothing; other limits, less clearance or "
     "`free_path` may reach it"
 )
-_scenes: Store[Context] = Store(_KEPT)
+_scenes: Cache[Context] = Cache(_KEPT)
 
 
 def plan(
@@ -163,7 +163,7 @@ def _plans(
 
 
 def _solve(
-    scene: Context, wanted: np.ndarray, search: Callable[..., Answer], most: int, tolerance: float, bar: Any
+    scene: Context, wanted: np.ndarray, search: Callable[..., BestWords], most: int, tolerance: float, bar: Any
 ) -> Plan:
     """Plans for targets (4, m) in batches."""
     seen = rotation_from_folded(scene, wanted)

@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from reojax.planning import quaternions
+from reojax.planning.cache import Cache
 from reojax.planning.clear_paths import Clear
 from reojax.planning.free_polygons import COARSE, Polygons
 from reojax.planning.freedom import Freedom
-from reojax.planning.store import Store
 
 _RANDOM = 4096
 """Random polygons of either kind: on the prototype half as many take 2 % more travel in the median."""
@@ -63,8 +63,8 @@ class PolygonTable(NamedTuple):
         return order.T.ravel()[:count]
 
 
-_tables: Store[PolygonTable] = Store(_KEPT)
-_clear: Store[np.ndarray] = Store(_KEPT)
+_tables: Cache[PolygonTable] = Cache(_KEPT)
+_clear: Cache[np.ndarray] = Cache(_KEPT)
 
 
 def table_of(polygons: Polygons, freedom: Freedom, key: object, seed: int, clear: Clear | None = None) -> PolygonTable:

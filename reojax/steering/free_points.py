@@ -12,7 +12,7 @@ from reojax._internal.arrays import Array
 from reojax.robot import Robot
 
 
-class Points(NamedTuple):
+class FreePoints(NamedTuple):
     """How `x` (n,), the free joints at the inner points, becomes the points of a motion."""
 
     ends: Float[Array, "p+1 j"]
@@ -32,7 +32,7 @@ class Points(NamedTuple):
         return lift.reshape(*lift.shape[:3], -1)
 
 
-def free_points(robot: Robot, points: Float[Array, "p+1 j"]) -> tuple[Points, Float[Array, " n"]]:
+def free_points(robot: Robot, points: Float[Array, "p+1 j"]) -> tuple[FreePoints, Float[Array, " n"]]:
     """What of a spline's points may change, and its values here."""
     coupled = {joint: (driver, number) for number, (joint, driver) in enumerate(robot.couplings)}
     free = [k for k in range(robot.joints) if k not in coupled]
@@ -43,4 +43,4 @@ def free_points(robot: Robot, points: Float[Array, "p+1 j"]) -> tuple[Points, Fl
         carry = carry.at[joint, free.index(driver)].set(robot.coupling_ratio[number])
         offset = offset.at[joint].set(robot.coupling_offset[number])
     ends = jnp.zeros_like(points).at[0].set(points[0]).at[-1].set(points[-1])
-    return Points(ends, carry, offset), points[1:-1][:, np.array(free)].ravel()
+    return FreePoints(ends, carry, offset), points[1:-1][:, np.array(free)].ravel()

@@ -15,8 +15,8 @@ from reojax._internal.arrays import Array
 from reojax._internal.linalg import cholesky, cholesky_solve
 from reojax.steering.end import end_and_slope
 from reojax.steering.free_points import free_points
-from reojax.steering.limits import FEASIBLE, Task, bounds, conditions_and_slopes, states
-from reojax.steering.newton import STEPS, Answer, effort_form, judged, rows_at_steps
+from reojax.steering.limits import FEASIBLE, RightingTask, bounds, conditions_and_slopes, states
+from reojax.steering.newton import STEPS, Judged, effort_form, judged, rows_at_steps
 
 _PRICE = 1e4
 """Of the square of a limit that is passed, against the mean square of the miss."""
@@ -36,7 +36,7 @@ class _State(NamedTuple):
 
 @partial(jax.jit, static_argnums=1)
 def solve_for_all(
-    task: Task,
+    task: RightingTask,
     pieces: int,
     max_steps: int | Array,
     points: Float[Array, "m p+1 j"],
@@ -44,13 +44,13 @@ def solve_for_all(
     momenta: Float[Array, "k 3"],
     shares: Float[Array, " k"],
     duration: Array,
-) -> tuple[Answer, Float[Array, "m k"]]:
+) -> tuple[Judged, Float[Array, "m k"]]:
     """From each start the answer, judged at the mean momentum, and the angles that each of the momenta leaves."""
     one = partial(_solve_one, task, pieces, max_steps)
     return jax.vmap(one, (0, None, None, None, None))(points, goal, momenta, shares, duration)
 
 
-def _solve_one(task: Task, pieces: int, max_steps: int | Array, points, goal, momenta, shares, duration):
+def _solve_one(task: RightingTask, pieces: int, max_steps: int | Array, points, goal, momenta, shares, duration):
     robot, dtype = task.robot, points.dtype
     variables, x = free_points(robot, points)
     rows = rows_at_steps(pieces, STEPS, duration, dtype)
@@ -95,7 +95,7 @@ def _solve_one(task: Task, pieces: int, max_steps: int | Array, points, goal, mo
 
     s = jax.lax.fori_loop(0, max_steps, step, _State(x, *around(x), jnp.asarray(1e-2, dtype)))
 
-    def judge(share: Array) -> tuple[Answer, Array]:
+    def judge(share: Array) -> tuple[Judged, Array]:
         """At the mean momentum, by the worst of all; and the angles that they leave."""
         points = variables.of(x + share * (s.x - x))
         every = jnp.concatenate([(shares @ momenta)[None], momenta])

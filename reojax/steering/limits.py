@@ -21,7 +21,7 @@ _SOFT = 0.02
 """Power over which driving turns into being driven back [W]."""
 
 
-class Task(NamedTuple):
+class RightingTask(NamedTuple):
     """What all motions of a search share."""
 
     robot: Robot
@@ -34,7 +34,7 @@ class Task(NamedTuple):
     weights: Array
 
 
-def bounds(task: Task, spare: bool = False) -> tuple[Float[Array, " c"], Float[Array, " c"]]:
+def bounds(task: RightingTask, spare: bool = False) -> tuple[Float[Array, " c"], Float[Array, " c"]]:
     """Lowest and highest value of each condition of `conditions`; with the spare clearance, as a search has it."""
     robot = task.robot
     dtype = robot.mass.dtype
@@ -48,7 +48,7 @@ def bounds(task: Task, spare: bool = False) -> tuple[Float[Array, " c"], Float[A
     return low, high
 
 
-def conditions(task: Task, state: Float[Array, " s"]) -> Float[Array, " c"]:
+def conditions(task: RightingTask, state: Float[Array, " s"]) -> Float[Array, " c"]:
     """What is limited, at one node, of `(theta, theta_dot, theta_ddot, h)` with the momentum `h` in the base frame."""
     robot = task.robot
     theta, rate, acceleration, h = jnp.split(state, np.cumsum([robot.joints] * 3))
@@ -71,7 +71,7 @@ def states(
 
 
 def conditions_and_slopes(
-    task: Task, state: Float[Array, "k s"], lift: Float[Array, "k 3 j n"]
+    task: RightingTask, state: Float[Array, "k s"], lift: Float[Array, "k 3 j n"]
 ) -> tuple[Float[Array, "k c"], Float[Array, "k c n"]]:
     """`conditions` at all nodes, and how they change with what `lift` carries to the nodes; `h` is held."""
     joints = task.robot.joints

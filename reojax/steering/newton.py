@@ -16,7 +16,7 @@ from reojax._internal.linalg import cholesky, cholesky_solve, solve_symmetric3
 from reojax.mechanics.momentum import momentum_matrices
 from reojax.steering.end import basis, end_and_slope, end_of
 from reojax.steering.free_points import free_points
-from reojax.steering.limits import FEASIBLE, Task, bounds, conditions, conditions_and_slopes, states
+from reojax.steering.limits import FEASIBLE, RightingTask, bounds, conditions, conditions_and_slopes, states
 
 STEPS, EXACT_STEPS = 6, 16
 """Steps of the integration to a piece, for the search and for the answer."""
@@ -28,7 +28,7 @@ STRENGTH = 30.0
 """Price of the square of a limit that is passed."""
 
 
-class Answer(NamedTuple):
+class Judged(NamedTuple):
     """A motion, and what is to be known of it; fields as of `Righting`."""
 
     points: Array
@@ -41,7 +41,7 @@ class Answer(NamedTuple):
     steps: Array
 
 
-class _State(NamedTuple):
+class _Iterate(NamedTuple):
     x: Array
     multipliers: Array
     reach: Array
@@ -53,7 +53,9 @@ class _State(NamedTuple):
 
 
 @partial(jax.jit, static_argnums=1)
-def solve(task: Task, pieces: int, max_steps: int | Array, points, goals, momenta, durations, tolerance) -> Answer:
+def solve(
+    task: RightingTask, pieces: int, max_steps: int | Array, points, goals, momenta, durations, tolerance
+) -> Judged:
     """Many releases side by side: `points` (m, p + 1, j) to start from, and of each its goal, momentum, duration."""
     one = partial(_solve_one, task, pieces, max_steps)
     points, goals, momenta, durations = map(jnp.asarray, (points, goals, momenta, durations))
@@ -74,7 +76,9 @@ def rows_at_steps(pieces: int, steps: int, duration: Array, dtype: np.dtype) -> 
     return rows * (1 / duration) ** jnp.arange(3, dtype=dtype)[None, :, None]
 
 
-def _solve_one(task: Task, pieces: int, max_steps: int | Array, points, goal, momentum, duration, tolerance) -> Answer:
+def _solve_one(
+    task: RightingTask, pieces: int, max_steps: int | Array, points, goal, momentum, duration, tolerance
+) -> Judged:
     robot, dtype = task.robot, points.dtype
     variables, x = free_points(robot, points)
     rows = rows_at_steps(pieces, STEPS, duration, dtype)
@@ -84,7 +88,7 @@ def _solve_one(task: Task, pieces: int, max_steps: int | Array, points, goal, mo
     hessian = jnp.kron(jnp.asarray(form[1:-1, 1:-1], dtype), variables.carry.T @ carried)
     hessian = hessian + 1e-6 * jnp.eye(x.size, dtype=dtype)
 
-    def step(s: _State, aim: Array) -> _State:
+    def step(s: _Iterate, aim: Array) -> _Iterate:
         points = variables.of(s.x)
         history, slope = end_and_slope(robot, points, duration, momentum, STEPS)
         value, by = conditions_and_slopes(task, states(rows, points, history, momentum), lift)
@@ -116,18 +120,18 @@ def _solve_one(task: Task, pieces: int, max_steps: int | Array, points, goal, mo
         multipliers = jnp.where(near, push, s.multipliers)
         moved = jnp.abs(move).max()
         settled = s.settled | (s.steps >= max_steps - _LAST) | (near & (moved < _SETTLED) & (beyond < 10 * FEASIBLE))
-        return _State(s.x + move, multipliers, reach, length, moved, beyond, settled, s.steps + 1)
+        return _Iterate(s.x + move, multipliers, reach, length, moved, beyond, settled, s.steps + 1)
 
-    def going(s: _State) -> Array:
+    def going(s: _Iterate) -> Array:
         done = s.settled & (s.miss < 0.1 * tolerance) & (s.beyond < 0.5 * FEASIBLE)
         return (s.steps < max_steps) & ~done
 
     huge = jnp.asarray(1e3, dtype)
     no = jnp.zeros((), bool)
     none = jnp.zeros((len(rows), low.shape[1]), dtype)
-    s = _State(x, none, jnp.asarray(0.4, dtype), huge, huge, huge, no, jnp.zeros((), int))
+    s = _Iterate(x, none, jnp.asarray(0.4, dtype), huge, huge, huge, no, jnp.zeros((), int))
 
-    def search(k: Array, carry: tuple[_State, Array]) -> tuple[_State, Array]:
+    def search(k: Array, carry: tuple[_Iterate, Array]) -> tuple[_Iterate, Array]:
         """Once from the start, and again for what the steps of the search miss of the true end."""
         s, aim = carry
         s = jax.lax.while_loop(going, lambda s: step(s, aim), s)
@@ -141,7 +145,7 @@ def _solve_one(task: Task, pieces: int, max_steps: int | Array, points, goal, mo
     return judged(task, pieces, variables.of(s.x), goal, momentum, duration, s.steps)
 
 
-def judged(task: Task, pieces: int, points, goal, momentum, duration, steps) -> Answer:
+def judged(task: RightingTask, pieces: int, points, goal, momentum, duration, steps) -> Judged:
     """A motion with all that is to be known of it, by the finer integration."""
     robot, dtype = task.robot, points.dtype
     history = end_of(robot, points, duration, momentum, EXACT_STEPS)
@@ -157,4 +161,4 @@ def judged(task: Task, pieces: int, points, goal, momentum, duration, steps) -> 
     own = basis(pieces, STEPS)
     acceleration = jnp.asarray(own.nodes[:, 2], dtype) @ points / duration**2
     effort = (jnp.asarray(own.weights, dtype)[:, None] * acceleration**2 * task.weights[None]).sum()
-    return Answer(points, so3.angle(rotation.T @ goal), beyond, effort, rotation, omega, margin, steps)
+    return Judged(points, so3.angle(rotation.T @ goal), beyond, effort, rotation, omega, margin, steps)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class State(NamedTuple):
+class OnboardState(NamedTuple):
     """What the law remembers."""
 
     time: float
@@ -35,7 +35,7 @@ class State(NamedTuple):
     """(n, 4) times of the last ticks and `filtered` at each, the newest last."""
 
 
-class Law:
+class OnboardLaw:
     """The law for one motion.
 
     Args:
@@ -57,11 +57,13 @@ class Law:
     ):
         self.table, self.tau, self.settle, self.largest, self.memory = table, tau, settle, largest, memory
 
-    def start(self) -> State:
+    def start(self) -> OnboardState:
         """No change yet."""
-        return State(0.0, np.zeros(3), np.zeros(3), np.zeros(3), 0.0, np.zeros((self.memory, 4)))
+        return OnboardState(0.0, np.zeros(3), np.zeros(3), np.zeros(3), 0.0, np.zeros((self.memory, 4)))
 
-    def step(self, state: State, time: float, seen: tuple[np.ndarray, float] | None = None) -> tuple[State, np.ndarray]:
+    def step(
+        self, state: OnboardState, time: float, seen: tuple[np.ndarray, float] | None = None
+    ) -> tuple[OnboardState, np.ndarray]:
         """One tick: the new state, and joint angles (j,) to go to [rad].
 
         `seen` is an orientation of the base (3, 3) and the time when it was read, if there is one.
@@ -77,7 +79,7 @@ class Law:
             steer = corrected(now, later, steer, filtered, rate, error, worth, self.tau, self.largest)
         filtered, rate = smooth(steer, filtered, rate, time - state.time, self.tau)
         past = np.vstack([state.past[1:], [time, *filtered]])
-        return State(time, steer, filtered, rate, read, past), now["theta"] - now["direction"] @ filtered
+        return OnboardState(time, steer, filtered, rate, read, past), now["theta"] - now["direction"] @ filtered
 
 
 def corrected(now, later, steer, filtered, rate, error, worth, tau, largest):

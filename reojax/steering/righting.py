@@ -24,7 +24,7 @@ from reojax.mechanics.own_units import without_names
 from reojax.motion.motor import Motor, check_motors, per_joint
 from reojax.robot import Robot
 from reojax.steering.asked import posture, reasonable
-from reojax.steering.limits import Task
+from reojax.steering.limits import RightingTask
 from reojax.steering.result import Righting
 from reojax.steering.search import least_durations, search
 
@@ -139,7 +139,7 @@ def _righting(robot, goals, momenta, duration, start, end, motors, clearance, we
     return least_durations(look, found, goals, h, keep=duration is not None)
 
 
-def task_of(robot, momenta, seconds, start, end, motors, clearance, weights, pieces) -> tuple[Task, int]:
+def task_of(robot, momenta, seconds, start, end, motors, clearance, weights, pieces) -> tuple[RightingTask, int]:
     """What all motions of a search share, checked, and the pieces of their splines."""
     checks.instance("robot", robot, Robot, "`make_robot` makes")
     checks.on_host("robot", robot, "righting")
@@ -167,6 +167,6 @@ def task_of(robot, momenta, seconds, start, end, motors, clearance, weights, pie
                 raise ValueError(f"`clearance` is {clearance} m; the posture at the {entry} has only {own:.4g} m.")
         spare = np.minimum(_SPARE, min(kept.values()) - least)
     plain = without_names(robot, shapes=least is not None, couplings=True)  # one program for all robots of this tree
-    task = Task(plain, None if known is None else per_joint(known, np.dtype(float)), least, spare, first, last,
+    task = RightingTask(plain, None if known is None else per_joint(known, np.dtype(float)), least, spare, first, last,
                 price / price.mean())  # fmt: skip
     return jax.tree.map(lambda x: jnp.asarray(x, float), task), pieces

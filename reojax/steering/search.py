@@ -13,7 +13,7 @@ from reojax.mechanics.momentum import momentum_matrices
 from reojax.optimisation.status import Status
 from reojax.steering.clear_motion import proven_clearance
 from reojax.steering.end import basis
-from reojax.steering.limits import FEASIBLE, Task
+from reojax.steering.limits import FEASIBLE, RightingTask
 from reojax.steering.newton import EXACT_STEPS, solve
 from reojax.steering.result import Righting, trajectory_through
 from reojax.steering.starts import RobotKey, random_motions
@@ -25,7 +25,7 @@ LANES = 32
 _LEAST = Righting._fields.index("least_duration")
 
 
-def search(task: Task, goals, momenta, durations, *, pieces, starts, tolerance, max_steps, seed) -> Righting:
+def search(task: RightingTask, goals, momenta, durations, *, pieces, starts, tolerance, max_steps, seed) -> Righting:
     """From ever further starts, until each release has its motion; lanes of one size, one program."""
     table, ends = random_motions(RobotKey(task.robot), pieces, seed, task.start.tobytes(), task.end.tobytes())
     m = len(goals)

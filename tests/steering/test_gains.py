@@ -221,7 +221,7 @@ def test_the_onboard_law_takes_an_error_back(lag):
     nearby = [onboard.at(table, time)["theta"] - TRAJECTORY.at(time).theta for time in (0.05, 0.21, 0.4)]
     assert np.abs(nearby).max() < 2e-3
     off = onboard.exp(4e-3 * np.array([1.0, 0.7, -1.0]))
-    law = onboard.Law(table)
+    law = onboard.OnboardLaw(table)
     state, joints, rotations = law.start(), [np.asarray(TRAJECTORY.at(0.0).theta)], [off]
     turn = jax.jit(lambda a, b: reojax.net_rotation(ROBOT, reojax.Path(jnp.stack([a, b])), steps=1))
     for k in range(1, 311):

@@ -9,16 +9,16 @@ from typing import Generic, TypeVar
 
 Kept = TypeVar("Kept")
 
-_stores: list[Store] = []
+_caches: list[Cache] = []
 
 
-class Store(Generic[Kept]):
+class Cache(Generic[Kept]):
     """A few things by key; the least recently used goes when there are too many."""
 
     def __init__(self, size: int):
         self._size, self._lock = size, RLock()
         self._things: OrderedDict[Hashable, Kept] = OrderedDict()
-        _stores.append(self)
+        _caches.append(self)
 
     def get(self, key: Hashable, make: Callable[[], Kept]) -> Kept:
         """What is stored under a key, made if it is not there; another thread that asks for it meanwhile waits."""
@@ -38,5 +38,5 @@ class Store(Generic[Kept]):
 
 def forget() -> None:
     """Drop all tables and programs that planning keeps; a few hundred megabytes at the most."""
-    for store in _stores:
-        store.clear()
+    for cache in _caches:
+        cache.clear()
