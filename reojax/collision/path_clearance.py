@@ -97,6 +97,11 @@ def least_clearance(
     return _least_clearance(geometry, waypoints, (tolerance, enough, margin), structure_of(robot), dtype)
 
 
+def look_for(margin: float) -> tuple[float, float, float]:
+    """Limits of `least_clearance` that look no closer than it takes to tell whether a margin [m] is kept."""
+    return 0.02 * abs(margin) + 1e-5, margin, margin
+
+
 @partial(jax.jit, static_argnums=(3, 4))
 def _least_clearance(
     geometry: Geometry,

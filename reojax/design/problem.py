@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from reojax._internal import checks
 from reojax._internal.arrays import Array, as_numbers
-from reojax.collision.path_clearance import least_clearance
+from reojax.collision.path_clearance import least_clearance, look_for
 from reojax.design.loops import Loops
 from reojax.design.outcome import Measure, Outcome
 from reojax.design.self_clearance import ClearBy, solve_proven
@@ -294,8 +294,7 @@ class Problem:
     def _proof(self, x: Array) -> Array:
         """Whether one is, looked at no closer than that takes."""
         outcome, margin = self.outcome(x), max(measure.margin for measure in self._clear)
-        closest = 0.02 * abs(margin) + 1e-5
-        return least_clearance(outcome.robot, outcome.path.waypoints, closest, margin, margin).distance >= margin
+        return least_clearance(outcome.robot, outcome.path.waypoints, *look_for(margin)).distance >= margin
 
 
 def _concatenate(x: Array, parts: Sequence[Any]) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from reojax.collision.clearance import clearances
 from reojax.collision.constraint import with_spare
-from reojax.collision.path_clearance import PathClearance, least_clearance
+from reojax.collision.path_clearance import PathClearance, least_clearance, look_for
 from reojax.mechanics.own_units import without_names
 from reojax.robot import Robot
 
@@ -44,7 +44,7 @@ class Clear(NamedTuple):
 
     def _enough(self, paths: Float[np.ndarray, "m v j"]) -> Float[np.ndarray, " m"]:
         """Lower bounds on the clearance, made sharp only as far as it takes to tell whether the margin is kept [m]."""
-        return np.asarray(self._look(paths, (0.02 * self.margin + 1e-5, self.margin, self.margin)).distance, float)
+        return np.asarray(self._look(paths, look_for(self.margin)).distance, float)
 
     def with_spare(self, spare: float) -> Float[np.ndarray, " p"]:
         """Clearance to ask of each pair at samples [m], up to `spare` more than the margin."""
