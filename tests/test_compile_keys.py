@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -72,6 +72,51 @@ ENTRIES: dict[str, Callable[[Robot], Any]] = {
     "free_path": lambda robot: reojax.free_path(robot, TARGET, lower=-1.5, upper=1.5),
     "plan with clearance": clear_plan,
 }
+TURNED = reojax.manoeuvre_a(np.deg2rad(270), np.deg2rad(120))
+"""As other tests of fastest motions have it, so that what they compile is kept for all."""
+
+
+class Numbers(NamedTuple):
+    """What problems of one kind differ by."""
+
+    robot: Robot
+    motors: reojax.Motor
+    path: reojax.Path
+    target: Any
+    theta: np.ndarray
+
+
+def numbers(robot: Robot, share: float) -> Numbers:
+    """A robot, motors, a path, a target and a posture that are all `share` of some others."""
+    scaled = robot.replace(mass=share * np.asarray(robot.mass), inertia=share * np.asarray(robot.inertia))
+    motors, path = RE_MAX_17._replace(supply=12.0 * share), reojax.polygon(share * np.asarray(TURNED.waypoints))
+    return Numbers(scaled, motors, path, np.asarray(reojax.so3.exp(np.array([0, 0, np.pi * share]))), share * THETA)
+
+
+def moved(given: Numbers) -> reojax.Trajectory:
+    return reojax.along(given.path, "quintic", DURATIONS)
+
+
+def spread_of(given: Numbers) -> Any:
+    return design.spread(given.robot, given.path, {"mass[1]": 1e-3}, draws=4)
+
+
+KINDS: dict[str, Callable[[Numbers], Any]] = {
+    "clearance": lambda given: reojax.clearance(given.robot, given.theta),
+    "path_clearance": lambda given: reojax.path_clearance(given.robot, given.path),
+    "simulate": lambda given: reojax.simulate(
+        given.robot, given.path, durations=DURATIONS, motors=given.motors, samples=8
+    ),
+    "minimum_time": lambda given: reojax.minimum_time(given.robot, given.path, given.motors),
+    "track": lambda given: reojax.track(given.robot, moved(given), given.motors, reojax.gains(given.robot, 3.0)),
+    "spread": spread_of,
+    "correction_gains": lambda given: reojax.correction_gains(given.robot, given.path, samples=9),
+    "overlap": lambda given: reojax.overlap(given.robot, given.path, given.motors),
+    "free_law": lambda given: reojax.free_law(given.robot, given.path, given.motors, points=1),
+    "fastest_loop": lambda given: reojax.fastest_loop(
+        given.robot, given.target, given.motors, given.path, knots=5, starts=1
+    ),
+}
 QUICK = {"net_rotation", "clearance", "simulate", "minimum_time", "plan"}
 
 
@@ -110,6 +155,13 @@ def test_compilations_are_counted(robot):
 def test_the_same_robot_renamed_compiles_nothing(entry, robot):
     ENTRIES[entry](robot)
     assert compiled(lambda: ENTRIES[entry](renamed(robot))) == 0
+
+
+@pytest.mark.parametrize("entry", [pytest.param(e, marks=[pytest.mark.slow] * (e not in QUICK)) for e in KINDS])
+def test_other_numbers_compile_nothing(entry, robot):
+    """The same kind of problem with other masses, motors, path and target: all numbers are arguments of programs."""
+    KINDS[entry](numbers(robot, 1.0))
+    assert compiled(lambda: KINDS[entry](numbers(robot, 0.95))) == 0
 
 
 @pytest.mark.parametrize("entry", ["net_rotation", "simulate", "minimum_time"])

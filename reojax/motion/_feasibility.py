@@ -45,18 +45,14 @@ class Linearised(NamedTuple):
     inequality_jacobian: Float[Array, "q n"]
 
 
-def with_jacobian(function: Callable[..., Conditions]) -> Callable[..., Linearised]:
-    """Conditions of the unknowns (n,) and of anything more, with derivatives by the unknowns."""
-
-    def both(x: Array, *more: Array) -> Linearised:
-        slope, value = jax.jacfwd(lambda x: (function(x, *more),) * 2, has_aux=True)(x)
-        return Linearised(*value, *slope)
-
-    return jax.jit(both)
+def linearise(function: Callable[[Array], Conditions], x: Array) -> Linearised:
+    """Conditions of the unknowns (n,) with their derivatives."""
+    slope, value = jax.jacfwd(lambda x: (function(x),) * 2, has_aux=True)(x)
+    return Linearised(*value, *slope)
 
 
 def restore_feasibility(
-    linearise: Callable[[Any, Any], Linearised],
+    linearised: Callable[[Any, Any], Linearised],
     build: Callable[[Any], Trajectory],
     miss: Callable[[Trajectory], Any],
     start: Float[np.ndarray, " n"],
@@ -65,7 +61,7 @@ def restore_feasibility(
     """Return the unknowns of a motion, changed little, for the net rotation wanted and all joints within limits.
 
     Args:
-        linearise: conditions of the motion and their derivatives, by the unknowns and shares of the pieces (2, p, j).
+        linearised: conditions of the motion and their derivatives, by the unknowns and shares of the pieces (2, p, j).
         build: makes the motion.
         miss: of a motion, exactly what the equality gives roughly.
         start: the unknowns.
@@ -75,7 +71,7 @@ def restore_feasibility(
     x = start
     for _ in range(_STEPS):
         trajectory = build(x)
-        now = Linearised(*(np.array(part) for part in linearise(x, farthest(trajectory))))
+        now = Linearised(*(np.array(part) for part in linearised(x, farthest(trajectory))))
         if now.equality.size:
             now = now._replace(equality=np.asarray(miss(trajectory)))
         now = now._replace(inequality=now.inequality + _CLEAR)
@@ -85,25 +81,43 @@ def restore_feasibility(
     return x
 
 
-def limits(robot: Robot) -> list[tuple[int, int, float]]:
-    """Sign, joint and place [rad] of all limits that there are."""
+Ends = tuple[tuple[int, int], ...]
+"""Limits that there are: sign, 1 for an upper one and -1 for a lower one, and joint."""
+
+
+def ends_of(robot: Robot) -> Ends:
+    """All finite limits of a robot whose numbers can be read."""
     ends = ((1, np.asarray(robot.upper)), (-1, np.asarray(robot.lower)))
-    return [(sign, k, float(end[k])) for sign, end in ends for k in range(robot.joints) if np.isfinite(end[k])]
+    return tuple((sign, int(k)) for sign, end in ends for k in np.flatnonzero(np.isfinite(end)))
 
 
-def beyond_limits(robot: Robot, trajectory: Trajectory, share: Float[Array, "2 p j"]) -> Float[Array, " l"]:
-    """How far joints are beyond their limits [rad] at a share of each piece, for all limits and pieces."""
+def past_end(robot: Robot, end: tuple[int, int], theta: Float[Array, "... j"]) -> Float[Array, "..."]:
+    """How far a joint is beyond a limit in some postures [rad]; negative within."""
+    sign, joint = end
+    limit = robot.upper[joint] if sign > 0 else robot.lower[joint]
+    return sign * (theta[..., joint] - limit)
+
+
+def beyond_limits(robot: Robot, trajectory: Trajectory, share: Float[Array, "2 p j"], ends: Ends) -> Float[Array, " l"]:
+    """How far joints are beyond their limits [rad] at a share of each piece, for all limits and pieces.
+
+    Args:
+        robot: the robot.
+        trajectory: the motion.
+        share: where in each piece each joint is looked at, against its upper and its lower limit.
+        ends: the limits.
+    """
     time = jnp.asarray(share) * jnp.diff(trajectory.breaks)[None, :, None]
     place = jnp.zeros_like(time)
     for row in range(trajectory.coefficients.shape[1])[::-1]:
         place = place * time + trajectory.coefficients[None, :, row]
-    past = [sign * (place[0 if sign > 0 else 1, :, k] - limit) for sign, k, limit in limits(robot)]
+    past = [past_end(robot, end, place[0 if end[0] > 0 else 1]) for end in ends]
     return jnp.concatenate([jnp.zeros(0, place.dtype), *past])
 
 
 def beyond(robot: Robot, trajectory: Trajectory) -> float:
     """Farthest that a joint goes beyond its limits [rad], at any time; 0 for none."""
-    return float(np.asarray(beyond_limits(robot, trajectory, farthest(trajectory))).max(initial=0.0))
+    return float(np.asarray(beyond_limits(robot, trajectory, farthest(trajectory), ends_of(robot))).max(initial=0.0))
 
 
 def farthest(trajectory: Trajectory) -> Float[np.ndarray, "2 p j"]:

@@ -11,8 +11,8 @@ from jaxtyping import Bool, Float, Int
 from reojax._internal.arrays import Array
 from reojax._internal.result_text import printed_as
 from reojax.collision.constraint import with_spare
-from reojax.motion._feasibility import beyond, restore_feasibility
-from reojax.motion._transcription import Apart, Task, Transcription, UnknownBox
+from reojax.motion._feasibility import beyond, ends_of, restore_feasibility
+from reojax.motion._transcription import Apart, Numbers, Task, Transcription, UnknownBox, numbers_of
 from reojax.motion.least_time import minimum_stretch
 from reojax.motion.trajectory import Trajectory, stretch
 from reojax.motion.trajectory_clearance import trajectory_clearance
@@ -86,16 +86,32 @@ class _Answer(NamedTuple):
     """Proven [m], if any was asked for."""
 
 
+class _Programs(NamedTuple):
+    """A task, and its conditions with its numbers put in."""
+
+    task: Task
+    box: UnknownBox
+    conditions: Transcription
+    numbers: Numbers
+
+    def build(self, x: Array) -> Trajectory:
+        return self.conditions.build(x, self.numbers)
+
+    def rotation_left(self, trajectory: Trajectory) -> Array:
+        return self.conditions.rotation_left(trajectory, self.numbers)
+
+
 def least_duration(task: Task, starts: np.ndarray, box: UnknownBox, max_steps: int, progress: bool | str) -> Fastest:
     """Solve a task from several starts, (m, n); the best answer is restored, and run as fast as its motors allow."""
-    functions = Transcription(task, box)
+    conditions = Transcription(task.parametrisation, ends_of(task.robot), task.apart is not None)
+    programs = _Programs(task, box, conditions, numbers_of(task, box))
     if task.apart is None:
-        answer = _solve(functions, starts, np.zeros(0), max_steps, progress)
+        answer = _solve(programs, starts, np.zeros(0), max_steps, progress)
     else:
-        answer = _solve_apart(functions, task.apart, starts, max_steps, progress)
+        answer = _solve_apart(programs, task.apart, starts, max_steps, progress)
     found, trajectory = answer.found, answer.trajectory
     kept = task.apart is None or bool(answer.clearance >= task.apart.margin)
-    error, past = jnp.linalg.norm(functions.rotation_left(trajectory)), beyond(functions.robot, trajectory)
+    error, past = jnp.linalg.norm(programs.rotation_left(trajectory)), beyond(task.robot, trajectory)
     past = past if past > _ROUNDING else 0.0  # a corner of a path may lie on a limit
     good = bool(found.converged[found.best]) and past == 0 and float(error) < _EXACT and kept
     return Fastest(
@@ -110,33 +126,33 @@ def least_duration(task: Task, starts: np.ndarray, box: UnknownBox, max_steps: i
 
 
 def _solve(
-    functions: Transcription, starts: np.ndarray, wanted: np.ndarray, max_steps: int, progress: bool | str
+    programs: _Programs, starts: np.ndarray, wanted: np.ndarray, max_steps: int, progress: bool | str
 ) -> _Answer:
     """Optimise from all starts, restore the best, and stretch it to what the motors give."""
-    task, box = functions.task, functions.box
+    task, box, conditions, numbers = programs
     found = optimise_together(
-        functions.at_samples, starts, lower=box.lower, upper=box.upper, scale=box.scale,
-        data=np.tile(wanted, (len(starts), 1)), tolerance=_TOLERANCE, slope_tolerance=_SLOPE, max_steps=max_steps,
-        progress=progress,
+        conditions, starts, lower=box.lower, upper=box.upper, scale=box.scale,
+        data=np.tile(wanted, (len(starts), 1)), shared=numbers, tolerance=_TOLERANCE, slope_tolerance=_SLOPE,
+        max_steps=max_steps, progress=progress,
     )  # fmt: skip
     best = np.asarray(found.value[found.best], float)
-    if not task.kept or beyond(functions.robot, functions.build(best)) > _ROUNDING:
-        linearise = lambda x, share: functions.linearise(x, share, wanted)
+    if not task.parametrisation.keeps_rotation or beyond(task.robot, programs.build(best)) > _ROUNDING:
+        linearised = lambda x, share: conditions.linearised(x, share, wanted, numbers)
         limits = box.lower, box.upper, box.scale
-        best = restore_feasibility(linearise, functions.build, functions.rotation_left, best, limits)
-    trajectory = functions.build(best)
+        best = restore_feasibility(linearised, programs.build, programs.rotation_left, best, limits)
+    trajectory = programs.build(best)
     return _Answer(found, best, stretch(trajectory, minimum_stretch(task.robot, trajectory, task.motors)))
 
 
 def _solve_apart(
-    functions: Transcription, apart: Apart, starts: np.ndarray, max_steps: int, progress: bool | str
+    programs: _Programs, apart: Apart, starts: np.ndarray, max_steps: int, progress: bool | str
 ) -> _Answer:
     """Solve with a clearance at the samples, and again with more where the proof finds too little between them."""
     spare = 0.02 * apart.margin + 1e-4
 
     def attempt(starts: np.ndarray) -> _Answer:
-        answer = _solve(functions, starts, with_spare(apart.margin, spare, apart.have), max_steps, progress)
-        return answer._replace(clearance=trajectory_clearance(functions.task.robot, answer.trajectory).distance)
+        answer = _solve(programs, starts, with_spare(apart.margin, spare, apart.have), max_steps, progress)
+        return answer._replace(clearance=trajectory_clearance(programs.task.robot, answer.trajectory).distance)
 
     answer = attempt(starts)
     for _ in range(_AGAIN):

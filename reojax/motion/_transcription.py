@@ -6,8 +6,9 @@ farthest, which feasibility restoration sees. Angular velocities at Gauss nodes 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,7 +20,9 @@ from reojax._internal.arrays import Array, cast
 from reojax.collision.constraint import clearance_shortfall
 from reojax.mechanics.dynamics import joint_load
 from reojax.mechanics.integrators import GAUSS, end_rotation
-from reojax.motion._feasibility import Conditions, beyond_limits, limits, with_jacobian
+from reojax.mechanics.own_units import without_names
+from reojax.motion._feasibility import Conditions, Ends, Linearised, beyond_limits, linearise, past_end
+from reojax.motion._parametrisation import Parametrisation
 from reojax.motion.motor import Motor, demand, no_load_speed, per_joint, stall_torque
 from reojax.motion.simulation import net_rotation_of
 from reojax.motion.trajectory import Trajectory, polynomial
@@ -52,14 +55,10 @@ class Task(NamedTuple):
     motors: Motor
     goal: Array
     """(3, 3) the net rotation wanted."""
-    kept: bool
-    """Whether all unknowns have it."""
-    build: Callable[[Array], Trajectory]
-    """Makes the motion from the unknowns."""
-    cost: Callable[[Array], Array]
-    """Its duration."""
-    order: Callable[[Array], Array]
-    """Further numbers that must not be positive, linear in the unknowns."""
+    parametrisation: Parametrisation
+    """What the unknowns are."""
+    numbers: Any
+    """What motions are made of beside them."""
     apart: Apart | None
     """The clearance to keep, if any."""
 
@@ -72,73 +71,113 @@ class UnknownBox(NamedTuple):
     scale: np.ndarray
 
 
+class Numbers(NamedTuple):
+    """The numbers of a task: arguments of all its programs, float64."""
+
+    robot: Robot
+    motors: Motor
+    goal: Array
+    soft: Array
+    """Power over which the sign of a motor's power changes smoothly [W]."""
+    unit: Array
+    """Scale of times [s]."""
+    motion: Any
+    """What the parametrisation makes motions of."""
+
+
+def numbers_of(task: Task, box: UnknownBox) -> Numbers:
+    """The numbers of a task whose arrays can be read."""
+    motors = per_joint(task.motors, np.dtype(float))
+    strongest = np.max(np.asarray(stall_torque(motors) * no_load_speed(motors)))
+    robot = without_names(task.robot, shapes=task.apart is not None)
+    numbers = Numbers(robot, motors, task.goal, _SOFT * strongest, box.scale[0], task.numbers)
+    return cast(numbers, float)
+
+
+@dataclass(frozen=True)
 class Transcription:
-    """The conditions of a task as functions of its unknowns (n,)."""
+    """The conditions of a kind of task as functions of its unknowns (n,) and numbers; hashable, the key of programs."""
 
-    def __init__(self, task: Task, box: UnknownBox) -> None:
-        """Compile nothing yet; the functions are traced when they are called."""
-        self.task, self.box = task, box
-        self.robot = cast(task.robot, float)
-        self.motors = per_joint(task.motors, np.dtype(float))
-        strongest = np.max(np.asarray(stall_torque(self.motors) * no_load_speed(self.motors)))
-        self._soft = _SOFT * float(strongest)
-        self._limits = limits(self.robot)
-        self.build = jax.jit(task.build)
-        self.linearise = with_jacobian(self._exact)
-        self.rotation_left = jax.jit(self._rotation_left)
+    parametrisation: Parametrisation
+    ends: Ends
+    """The limits that joints have."""
+    apart: bool
+    """Whether a clearance is asked for."""
 
-    def at_samples(self, x: Array, wanted: Array) -> tuple[Array, Array, Array]:
+    def __call__(self, x: Array, wanted: Array, numbers: Numbers) -> tuple[Array, Array, Array]:
         """Cost, what must be zero, and what must not be positive, as the optimiser sees them.
 
         Args:
             x: the unknowns.
             wanted: (p,) clearance asked of each pair [m], or (0,).
+            numbers: of the task.
         """
-        rows, theta, turned = self._sample(x)
-        inequality = jnp.concatenate([rows, self._order(x), self._too_near(theta, wanted)])
-        return self.task.cost(x), self._rotation_error(turned), inequality
+        past, theta, turned = self._sample(x, numbers)
+        inequality = jnp.concatenate([past, self._further(x, theta, wanted, numbers)])
+        return self.parametrisation.duration(x), self._rotation_error(turned, numbers), inequality
 
-    def _exact(self, x: Array, share: Array, wanted: Array) -> Conditions:
-        """The conditions where the joints are farthest, without motors."""
-        _, theta, turned = self._sample(x)
-        past = beyond_limits(self.robot, self.task.build(x), share)
-        inequality = jnp.concatenate([past, self._order(x), self._too_near(theta, wanted)])
-        return Conditions(self._rotation_error(turned), inequality)
+    @partial(jax.jit, static_argnums=0)
+    def build(self, x: Array, numbers: Numbers) -> Trajectory:
+        """The motion."""
+        return self.parametrisation.build(x, numbers.motion)
 
-    def _rotation_left(self, trajectory: Trajectory) -> Float[Array, "3"]:
+    @partial(jax.jit, static_argnums=0)
+    def linearised(self, x: Array, share: Array, wanted: Array, numbers: Numbers) -> Linearised:
+        """The conditions where the joints are farthest, without motors, and their derivatives.
+
+        Args:
+            x: the unknowns.
+            share: (2, p, j) where in each piece each joint is farthest, see `farthest`.
+            wanted: (p,) clearance asked of each pair [m], or (0,).
+            numbers: of the task.
+        """
+
+        def exact(x: Array) -> Conditions:
+            _, theta, turned = self._sample(x, numbers)
+            motion = self.parametrisation.build(x, numbers.motion)
+            past = beyond_limits(numbers.robot, motion, share, self.ends)
+            inequality = jnp.concatenate([past, self._further(x, theta, wanted, numbers)])
+            return Conditions(self._rotation_error(turned, numbers), inequality)
+
+        return linearise(exact, x)
+
+    @partial(jax.jit, static_argnums=0)
+    def rotation_left(self, trajectory: Trajectory, numbers: Numbers) -> Float[Array, "3"]:
         """Rotation vector from the goal to a motion's net rotation, finely integrated."""
-        return so3.log(self.task.goal.T @ net_rotation_of(self.robot, trajectory, _FINE))
+        return so3.log(numbers.goal.T @ net_rotation_of(numbers.robot, trajectory, _FINE))
 
-    def _sample(self, x: Array) -> tuple[Array, Array, Array]:
+    def _sample(self, x: Array, numbers: Numbers) -> tuple[Array, Array, Array]:
         """At the samples: how far motors and joints are beyond their limits; the postures; and the net rotation."""
         # joints at all nodes of all pieces
-        trajectory = self.task.build(x)
+        trajectory = self.parametrisation.build(x, numbers.motion)
         length = jnp.diff(trajectory.breaks)
         state = jax.vmap(jax.vmap(polynomial, (None, 0)))(trajectory.coefficients, length[:, None] * _NODES[None])
         # supplies exceeded, limits passed
-        taken, omega = jax.vmap(jax.vmap(self._node))(*state)
-        past = [(sign * (state.theta[:, _LOOKED, k] - place)).ravel() for sign, k, place in self._limits]
+        taken, omega = jax.vmap(jax.vmap(partial(_node, numbers)))(*state)
+        looked = state.theta[:, _LOOKED]
+        past = [past_end(numbers.robot, end, looked).ravel() for end in self.ends]
         rows = jnp.concatenate([taken[:, _LOOKED].ravel(), *past])
         # the net rotation, from the Gauss nodes alone
         turned = end_rotation(jnp.repeat(length / _SAMPLES, _SAMPLES), omega[:, 1:-1].reshape(-1, 3, 3))
-        return rows, state.theta[:, _LOOKED], turned
+        return rows, looked, turned
 
-    def _node(self, theta: Array, theta_dot: Array, theta_ddot: Array) -> tuple[Array, Array]:
-        """Share of the supply that each motor takes too much, and the base's angular velocity."""
-        load = joint_load(self.robot, theta, theta_dot, theta_ddot)
-        a, b, c = demand(self.robot, self.motors, theta_dot, load, soft=self._soft)
-        return jnp.abs(a + b.sum(0) + c) / self.motors.supply - 1, load.omega
+    def _further(self, x: Array, theta: Array, wanted: Array, numbers: Numbers) -> Array:
+        """Conditions beside motors' and joints': the order of moves, and what is missing to the clearance."""
+        order = self.parametrisation.order(x) / numbers.unit
+        if not self.apart:
+            return order
+        # postures (p, k, j) of all pieces, the end of each being the start of the next; two conditions a piece
+        points = jnp.concatenate([theta[:, :-1].reshape(-1, numbers.robot.joints), theta[-1, -1:]])
+        short = clearance_shortfall(numbers.robot, points, 0.0, samples=1, groups=2 * len(theta), more=wanted)
+        return jnp.concatenate([order, short])
 
-    def _too_near(self, theta: Array, wanted: Array) -> Array:
-        """What is missing to the clearance at postures (p, k, j), two conditions a piece."""
-        if self.task.apart is None:
-            return jnp.zeros(0)
-        points = jnp.concatenate([theta[:, :-1].reshape(-1, self.robot.joints), theta[-1, -1:]])
-        return clearance_shortfall(self.robot, points, 0.0, samples=1, groups=2 * len(theta), more=wanted)
-
-    def _order(self, x: Array) -> Array:
-        return self.task.order(x) / self.box.scale[0]
-
-    def _rotation_error(self, turned: Array) -> Array:
+    def _rotation_error(self, turned: Array, numbers: Numbers) -> Array:
         """Rotation vector (3,) from the goal, where not all unknowns have it."""
-        return jnp.zeros(0) if self.task.kept else so3.log(self.task.goal.T @ turned)
+        return jnp.zeros(0) if self.parametrisation.keeps_rotation else so3.log(numbers.goal.T @ turned)
+
+
+def _node(numbers: Numbers, theta: Array, theta_dot: Array, theta_ddot: Array) -> tuple[Array, Array]:
+    """Share of the supply that each motor takes too much, and the base's angular velocity."""
+    load = joint_load(numbers.robot, theta, theta_dot, theta_ddot)
+    a, b, c = demand(numbers.robot, numbers.motors, theta_dot, load, soft=numbers.soft)
+    return jnp.abs(a + b.sum(0) + c) / numbers.motors.supply - 1, load.omega

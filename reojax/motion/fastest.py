@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from reojax._internal import checks
-from reojax._internal.arrays import Array
 from reojax._internal.precision import as_double, in_double
 from reojax.collision.refusal import check_clearance
 from reojax.mechanics.holonomy import net_rotation
 from reojax.motion._optimal_control import Fastest as Fastest, least_duration
+from reojax.motion._parametrisation import EdgeNumbers, FreeLaws, OverlappedEdges, SplineLoop
 from reojax.motion._transcription import Apart, Task, UnknownBox
 from reojax.motion.least_time import minimum_time
 from reojax.motion.motor import Motor, check_motors
 from reojax.motion.time_laws import Law, check_law, quintic, trapezoid
-from reojax.motion.trajectory import Trajectory, along, overlap_pieces, through
+from reojax.motion.trajectory import along
 from reojax.path import Path
 from reojax.robot import Robot
 
@@ -67,18 +67,6 @@ def overlap(
     total = float(durations.sum())
     start = np.concatenate([[0.0], np.cumsum(durations)])[edge]
     count = len(moves)
-    follows = [(a, b) for a in range(count) for b in range(a + 1, count) if moves[a][1] == moves[b][1]]
-    follows = np.array([(a, b) for a, b in follows if not any((a, c) in follows for c in range(a + 1, b))], int)
-    follows = follows.reshape(-1, 2)
-
-    def build(x: Array) -> Trajectory:
-        share = x[2 * count : -1]
-        return overlap_pieces(jnp.asarray(corners) * share[None], law, x[:count], x[count : 2 * count], moves)
-
-    def order(x: Array) -> Array:
-        begin, end = x[:count], x[:count] + x[count : 2 * count]
-        return jnp.concatenate([end - x[-1], end[follows[:, 0]] - begin[follows[:, 1]]])
-
     joints = robot.joints
     first = np.concatenate([start, durations[edge], np.ones(joints), [total]])
     low = np.concatenate([np.zeros(count), np.full(count, 0.05 * total / path.edges), np.full(joints + 1, 0.2)])
@@ -86,7 +74,8 @@ def overlap(
     low[-1] = 0.2 * total
     scale = np.concatenate([np.full(2 * count, 0.2 * total), np.full(joints, 0.3), [total]])
     goal = net_rotation(*as_double((robot, path)))
-    task = Task(robot, check_motors(motors, robot), goal, False, build, lambda x: x[-1], order, apart)
+    numbers = EdgeNumbers(corners, law)
+    task = Task(robot, check_motors(motors, robot), goal, OverlappedEdges(moves), numbers, apart)
     return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
 
@@ -129,24 +118,13 @@ def free_law(
     edge = along(Path(np.array([[0.0], [1.0]])), trapezoid(), np.ones(1))
     place = np.array([float(edge.at(u).theta[0]) for u in np.arange(1, points + 1) / (points + 1)])
 
-    def build(x: Array) -> Trajectory:
-        inner = jnp.concatenate([jnp.zeros((edges, 1)), x[edges:].reshape(edges, points), jnp.ones((edges, 1))], 1)
-        parts = [
-            through(
-                Path(corners[e][None] + inner[e][:, None] * (corners[e + 1] - corners[e])[None]), x[e] / (points + 1)
-            )
-            for e in range(edges)
-        ]
-        return join(parts)
-
     durations = 1.2 * np.asarray(least.durations, float)
     first = np.concatenate([durations, np.tile(place, edges)])
     low = np.concatenate([0.2 * durations, np.full(edges * points, -0.2)])
     high = np.concatenate([3 * durations, np.full(edges * points, 1.2)])
     scale = np.concatenate([0.5 * durations, np.full(edges * points, 0.3)])
-    cost = lambda x: x[:edges].sum()
     goal = net_rotation(*as_double((robot, path)))
-    task = Task(robot, check_motors(motors, robot), goal, True, build, cost, lambda x: x[:0], apart)
+    task = Task(robot, check_motors(motors, robot), goal, FreeLaws(edges, points), corners, apart)
     return least_duration(task, first[None], UnknownBox(low, high, scale), max_steps, progress)
 
 
@@ -194,16 +172,9 @@ def fastest_loop(
     motors = check_motors(motors, robot)
     least = minimum_time(robot, near, motors)
     apart = _apart(robot, clearance, {"the start of `near`": np.asarray(near.waypoints[0], float)})
-    law, joints = quintic(), robot.joints
-    begun = along(near, law, np.asarray(least.durations))
+    begun = along(near, quintic(), np.asarray(least.durations))
     total = 1.2 * float(least.duration)
     places = np.array([np.asarray(begun.at(t).theta) for t in np.linspace(0, float(least.duration), knots + 1)])
-    ends = jnp.asarray(places[[0]])
-
-    def build(x: Array) -> Trajectory:
-        inner = x[knots:].reshape(knots - 1, joints)
-        return through(Path(jnp.concatenate([ends, inner, ends])), x[:knots])
-
     rng = np.random.default_rng(checks.seed(seed))
     reach = np.minimum(np.asarray(robot.upper), np.pi) - np.maximum(np.asarray(robot.lower), -np.pi)
     first = np.tile(np.concatenate([np.full(knots, total / knots), places[1:-1].ravel()]), (starts, 1))
@@ -211,7 +182,7 @@ def fastest_loop(
     low = np.concatenate([np.full(knots, 0.1 * total / knots), np.tile(np.asarray(robot.lower, float), knots - 1)])
     high = np.concatenate([np.full(knots, 3 * total / knots), np.tile(np.asarray(robot.upper, float), knots - 1)])
     scale = np.concatenate([np.full(knots, total / knots), np.tile(0.3 * reach, knots - 1)])
-    task = Task(robot, motors, goal, False, build, lambda x: x[:knots].sum(), lambda x: x[:0], apart)
+    task = Task(robot, motors, goal, SplineLoop(knots), places[0], apart)
     return least_duration(task, np.clip(first, low, high), UnknownBox(low, high, scale), max_steps, progress)
 
 
@@ -226,10 +197,3 @@ def _check_moves(path: Path, entry: str = "path") -> None:
     corners = np.asarray(checks.instance(entry, path, Path, "polygon(...)").waypoints)
     if np.issubdtype(corners.dtype, np.floating) and len(corners) > 1 and not np.diff(corners, axis=0).any():
         raise ValueError(f"`{entry}` stays where it is; there is no motion to be made fast.")
-
-
-def join(parts: Sequence[Trajectory]) -> Trajectory:
-    """One trajectory after the other; each must begin where the one before it ends."""
-    begin = jnp.cumsum(jnp.stack([jnp.zeros_like(parts[0].duration), *(part.duration for part in parts)]))
-    breaks = [part.breaks[:-1] + start for part, start in zip(parts, begin[:-1], strict=True)]
-    return Trajectory(jnp.concatenate([*breaks, begin[-1:]]), jnp.concatenate([part.coefficients for part in parts]))

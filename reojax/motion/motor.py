@@ -148,7 +148,7 @@ def drive(robot: Robot, motors: Motor, theta_dot: Float[Array, " j"], load: Load
 
 
 def demand(
-    robot: Robot, motors: Motor, theta_dot: Float[Array, " j"], load: Load, *, soft: float = 0.0
+    robot: Robot, motors: Motor, theta_dot: Float[Array, " j"], load: Load, *, soft: Any = None
 ) -> tuple[Float[Array, " j"], Float[Array, "2 j"], Float[Array, " j"]]:
     """Voltage that a load takes, by how it grows with the speed of the motion at zero momentum [V].
 
@@ -158,7 +158,7 @@ def demand(
         theta_dot: as for `drive`.
         load: as for `drive`.
         soft: power over which driving turns into being driven back [W], so that an optimiser finds the demand
-            smooth; static. It jumps at 0, the default.
+            smooth; may be traced. It jumps by default.
 
     Returns:
         (j,) what grows with the square of the speed: inertia, through the gear and of the rotor;
@@ -170,7 +170,7 @@ def demand(
     # what the gear takes of the load's power, whichever way it flows
     geared = load.torque - load.rotor
     power = geared * theta_dot
-    driving = 0.5 * (1 + jnp.tanh(power / soft)) if soft else jnp.where(power >= 0, 1, 0)
+    driving = jnp.where(power >= 0, 1, 0) if soft is None else 0.5 * (1 + jnp.tanh(power / soft))
     through = geared * (driving / motors.efficiency + (1 - driving) * motors.efficiency_back)
     # resistance / k times the torque: (through the gear) / N and (rotor) / N, drag w, friction sign(w); and k w
     per_torque = motors.resistance / motors.torque_constant

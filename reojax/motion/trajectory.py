@@ -7,6 +7,7 @@ given times (`through`), which is another path: it rounds the corners.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from functools import partial
 from math import comb
 from typing import NamedTuple
@@ -196,6 +197,13 @@ def stretch(trajectory: Trajectory, factor: Float[Array, ""]) -> Trajectory:
     powers = trajectory.coefficients.shape[1]
     scale = (1 / jnp.asarray(factor)) ** jnp.arange(powers)
     return Trajectory(trajectory.breaks * factor, trajectory.coefficients * scale[None, :, None])
+
+
+def join(parts: Sequence[Trajectory]) -> Trajectory:
+    """One trajectory after the other; each must begin where the one before it ends."""
+    begin = jnp.cumsum(jnp.stack([jnp.zeros_like(parts[0].duration), *(part.duration for part in parts)]))
+    breaks = [part.breaks[:-1] + start for part, start in zip(parts, begin[:-1], strict=True)]
+    return Trajectory(jnp.concatenate([*breaks, begin[-1:]]), jnp.concatenate([part.coefficients for part in parts]))
 
 
 def _check_path(path: Path) -> None:

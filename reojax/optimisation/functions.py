@@ -20,9 +20,20 @@ from reojax._internal.arrays import Array
 from reojax._internal.checks import shorten
 
 Function = Callable[..., Any]
-Part = Callable[[Array, Any], Any]
 _BLOCK, _VALUES_BLOCK = 8, 12
 """Most starts differentiated in one call, and points evaluated: as many as a line search looks at."""
+
+
+class Given(NamedTuple):
+    """What functions are given beside the variables."""
+
+    data: Any
+    """A start's own, or that of a block of starts in front."""
+    shared: Any
+    """The same for all."""
+
+
+Part = Callable[[Array, Given], Any]
 
 
 class Values(NamedTuple):
@@ -48,38 +59,36 @@ class Functions(NamedTuple):
     inequality: tuple[Function, ...]
     with_data: bool
     together: Function | None = None
-    """To (cost, equality, inequality) at once, instead of the three, where these share most of their work."""
+    """Of x, data and what all starts share to (cost, equality, inequality) at once, instead of the three."""
 
     def parts(self) -> list[Part]:
-        """Functions of x and data to lists of costs, of equalities and of inequalities, each with what it has."""
-        call = lambda f, x, data: f(x, data) if self.with_data else f(x)
-        one = lambda entry, f, x, data: [_array(entry, call(f, x, data))]
+        """Functions to lists of costs, of equalities and of inequalities, each with what it has."""
         if self.together is not None:
             together = self.together
-            return [lambda x, data: tuple([jnp.asarray(array)] for array in call(together, x, data))]
+            return [lambda x, given: tuple([jnp.asarray(array)] for array in together(x, *given))]
+        call = lambda f, x, given: f(x, given.data) if self.with_data else f(x)
+        one = lambda entry, f, x, given: [_array(entry, call(f, x, given))]
         return [
-            lambda x, data: (one("cost", self.cost, x, data), [], []),
-            *(lambda x, data, f=f: ([], one("equality", f, x, data), []) for f in self.equality),
-            *(lambda x, data, f=f: ([], [], one("inequality", f, x, data)) for f in self.inequality),
+            lambda x, given: (one("cost", self.cost, x, given), [], []),
+            *(lambda x, given, f=f: ([], one("equality", f, x, given), []) for f in self.equality),
+            *(lambda x, given, f=f: ([], [], one("inequality", f, x, given)) for f in self.inequality),
         ]
 
 
 class Programs:
     """The two programs of some functions, for starts of one type, with the data of all starts."""
 
-    def __init__(self, functions: Functions, x: Float[np.ndarray, "m n"], data: Any) -> None:
-        """Compile them, unless they have been.
+    def __init__(self, functions: Functions, x: Float[np.ndarray, "m n"], data: Any, shared: Any = None) -> None:
+        """Compile them, unless they have been: numbers in `data` and `shared` are arguments of the programs.
 
         Raises:
             ValueError: if a function does not return real numbers of the right rank.
         """
-        self._data = jax.tree.map(np.asarray, data)
+        self._data, self._shared = jax.tree.map(np.asarray, data), jax.tree.map(jnp.asarray, shared)
         self._dtype = x.dtype
-        block = _power_of_two(min(len(x), _BLOCK))
-        leaves, structure = jax.tree.flatten(self._data)
-        types = tuple((leaf.shape[1:], jax.dtypes.canonicalize_dtype(leaf.dtype)) for leaf in leaves)
-        self._blocks = (_VALUES_BLOCK, block)
-        compiled = _compile(functions, x.dtype, x.shape[1], structure, types, self._blocks)
+        self._blocks = _VALUES_BLOCK, _power_of_two(min(len(x), _BLOCK))
+        types = Given(_types(self._data, 1), _types(self._shared, 0))
+        compiled = _compile(functions, x.dtype, x.shape[1], types, self._blocks)
         self._values, self._derivatives, self.equalities = compiled
 
     def values(self, x: Float[np.ndarray, "r n"], owner: Int[np.ndarray, " r"]) -> Values:
@@ -97,23 +106,38 @@ class Programs:
         place = np.minimum(np.arange(-(-count // block) * block), count - 1).reshape(-1, block)
         data_of = lambda p: jax.tree.map(lambda leaf: leaf[owner[p]], self._data)
         with jax.debug_nans(False):  # a point that is not finite is not taken, and no error
-            parts = [program(x[p].astype(self._dtype), data_of(p)) for p in place]
+            parts = [program(x[p].astype(self._dtype), Given(data_of(p), self._shared)) for p in place]
         return [
             np.concatenate([np.asarray(array, float) for array in arrays])[:count]
             for arrays in zip(*parts, strict=True)
         ]
 
 
+class _Types(NamedTuple):
+    """Structure, shapes and dtypes of a tree; hashable."""
+
+    structure: Any
+    leaves: tuple[tuple[tuple[int, ...], Any], ...]
+
+    def placeholders(self, *front: int) -> Any:
+        """The tree, every array with further axes in front, without numbers."""
+        return jax.tree.unflatten(
+            self.structure, [jax.ShapeDtypeStruct((*front, *shape), dtype) for shape, dtype in self.leaves]
+        )
+
+
+def _types(tree: Any, skip: int) -> _Types:
+    """Of a tree of arrays, without their first `skip` axes."""
+    leaves, structure = jax.tree.flatten(tree)
+    types = ((leaf.shape[skip:], jax.dtypes.canonicalize_dtype(leaf.dtype)) for leaf in leaves)
+    return _Types(structure, tuple(types))
+
+
 def _compile(
-    functions: Functions,
-    dtype: np.dtype,
-    n: int,
-    structure: Any,
-    types: tuple[tuple[tuple[int, ...], Any], ...],
-    blocks: tuple[int, int],
+    functions: Functions, dtype: np.dtype, n: int, types: Given, blocks: tuple[int, int]
 ) -> tuple[Function, Function, int]:
     """Both programs and the number of equalities."""
-    point = functions, dtype, n, structure, types
+    point = functions, dtype, n, types
     programs = _program(*point, blocks[0], _values), _program(*point, blocks[1], _derivatives)
     # tracing holds Python's lock, compiling does not
     with ThreadPoolExecutor(2) as pool:
@@ -141,21 +165,20 @@ def _program(
     functions: Functions,
     dtype: np.dtype,
     n: int,
-    structure: Any,
-    types: tuple[tuple[tuple[int, ...], Any], ...],
+    types: Given,
     block: int,
-    kind: Callable[[tuple[Part, ...], Array, Any], Any],
+    kind: Callable[[tuple[Part, ...], Array, Given], Any],
 ) -> _Program:
     """Trace a program. Only the last few are kept, as they hold on to a user's functions."""
     parts = _traced_once(functions)
     made = partial(kind, parts)
-    leaves = [jax.ShapeDtypeStruct((block, *shape), leaf) for shape, leaf in types]
-    data = jax.tree.unflatten(structure, leaves)
-    many = jax.vmap(made) if block > 1 else partial(_alone, made)
-    lowered = jax.jit(many).lower(jax.ShapeDtypeStruct((block, n), dtype), data)
-    point = jax.ShapeDtypeStruct((n,), dtype)
-    data = jax.tree.unflatten(structure, [jax.ShapeDtypeStruct(shape, leaf) for shape, leaf in types])
-    equalities = sum(array.size for part in parts for array in jax.eval_shape(part, point, data)[1])
+    many = jax.vmap(made, (0, Given(0, None))) if block > 1 else partial(_alone, made)
+    shared = types.shared.placeholders()
+    lowered = jax.jit(many).lower(
+        jax.ShapeDtypeStruct((block, n), dtype), Given(types.data.placeholders(block), shared)
+    )
+    point = jax.ShapeDtypeStruct((n,), dtype), Given(types.data.placeholders(), shared)
+    equalities = sum(array.size for part in parts for array in jax.eval_shape(part, *point)[1])
     return _Program(lowered, equalities)
 
 
@@ -165,22 +188,22 @@ def _traced_once(functions: Functions) -> tuple[Part, ...]:
     return tuple(jax.jit(part, inline=True) for part in functions.parts())
 
 
-def _values(parts: tuple[Part, ...], x: Array, data: Any) -> tuple[Array, Array]:
+def _values(parts: tuple[Part, ...], x: Array, given: Given) -> tuple[Array, Array]:
     """Cost and constraints of a point."""
-    found = [part(x, data) for part in parts]
+    found = [part(x, given) for part in parts]
     for kinds in found:
         _check(*kinds)
     rows = [array for kind in (1, 2) for kinds in found for array in kinds[kind]]
     return _total([array for kinds in found for array in kinds[0]]), _join(rows, x, 1)
 
 
-def _derivatives(parts: tuple[Part, ...], x: Array, data: Any) -> tuple[Array, Array, Array, Array]:
+def _derivatives(parts: tuple[Part, ...], x: Array, given: Given) -> tuple[Array, Array, Array, Array]:
     """Cost, constraints, gradient and Jacobian of a point."""
     cost, gradient, rows, jacobian = [], [], ([], []), ([], [])
     for part in parts:
-        kinds = jax.eval_shape(part, x, data)
+        kinds = jax.eval_shape(part, x, given)
         sizes = [sum(array.size for array in kind) for kind in kinds]
-        every = lambda x, part=part: _join([jnp.ravel(a) for kind in part(x, data) for a in kind], x, 1)
+        every = lambda x, part=part: _join([jnp.ravel(a) for kind in part(x, given) for a in kind], x, 1)
         value, slope = _differentiate(every, x)
         ends = np.cumsum(sizes)
         if sizes[0]:
@@ -193,9 +216,9 @@ def _derivatives(parts: tuple[Part, ...], x: Array, data: Any) -> tuple[Array, A
     return _total(cost), rows, _total(gradient), jacobian
 
 
-def _alone(function: Function, x: Array, data: Any) -> Any:
+def _alone(function: Function, x: Array, given: Given) -> Any:
     """One start in a block of its own, which takes less compilation than `vmap`."""
-    answer = function(x[0], jax.tree.map(lambda leaf: leaf[0], data))
+    answer = function(x[0], Given(jax.tree.map(lambda leaf: leaf[0], given.data), given.shared))
     return jax.tree.map(lambda leaf: leaf[None], answer)
 
 

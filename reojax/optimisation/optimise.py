@@ -15,7 +15,7 @@ from reojax._internal import checks
 from reojax._internal.precision import warn_user
 from reojax._internal.progress import label
 from reojax.optimisation.arguments import check_starts, check_tolerances
-from reojax.optimisation.functions import Function, Functions, Programs
+from reojax.optimisation.functions import Function, Functions, Given, Programs
 from reojax.optimisation.iterates import Iterates, ScaledProblem
 from reojax.optimisation.sqp import minimise
 from reojax.optimisation.status import Status, describe
@@ -115,7 +115,8 @@ def optimise(
     checks.function("cost", cost, *takes)
     both = _several("equality", equality, takes), _several("inequality", inequality, takes)
     functions = Functions(cost, *both, data is not None)
-    return _run(functions, starts, lower, upper, data, scale, tolerance, slope_tolerance, max_steps, progress)
+    given = Given(data, None)
+    return _run(functions, starts, lower, upper, given, scale, tolerance, slope_tolerance, max_steps, progress)
 
 
 def optimise_together(
@@ -125,15 +126,21 @@ def optimise_together(
     lower: ArrayLike,
     upper: ArrayLike,
     data: Any = None,
+    shared: Any = None,
     scale: ArrayLike | None = None,
     tolerance: float = 1e-8,
     slope_tolerance: float = 1e-6,
     max_steps: int = 200,
     progress: bool | str = False,
 ) -> Solution:
-    """As `optimise`, of one `function` to (cost, equality, inequality), for these share most of their work."""
-    functions = Functions(None, (), (), data is not None, function)
-    return _run(functions, starts, lower, upper, data, scale, tolerance, slope_tolerance, max_steps, progress)
+    """As `optimise`, of one `function` to (cost, equality, inequality), for these share most of their work.
+
+    It takes x (n,), the start's data, and `shared`, a pytree of arrays that is the same for all starts. What is
+    compiled is kept for all functions that are equal: a frozen dataclass with a `__call__` will do.
+    """
+    functions = Functions(None, (), (), True, function)
+    given = Given(data, shared)
+    return _run(functions, starts, lower, upper, given, scale, tolerance, slope_tolerance, max_steps, progress)
 
 
 def _run(
@@ -141,14 +148,14 @@ def _run(
     starts: ArrayLike,
     lower: ArrayLike,
     upper: ArrayLike,
-    data: Any,
+    given: Given,
     scale: ArrayLike | None,
     tolerance: float,
     slope_tolerance: float,
     max_steps: int,
     progress: bool | str,
 ) -> Solution:
-    x, box = check_starts(starts, lower, upper, scale, data)
+    x, box = check_starts(starts, lower, upper, scale, given.data)
     check_tolerances(tolerance=tolerance, slope_tolerance=slope_tolerance)
     checks.whole("max_steps", max_steps)
     if x.dtype == np.float32 and tolerance < _LEAST_SINGLE:
@@ -156,7 +163,7 @@ def _run(
             f"`tolerance` is {tolerance:g}, which single precision, JAX's default, seldom meets: switch double "
             'precision on by jax.config.update("jax_enable_x64", True) before anything is computed, or ask for 1e-5.'
         )
-    programs = Programs(functions, x, data)
+    programs = Programs(functions, x, *given)
     problem = ScaledProblem(
         programs=programs,
         lower=box.lower / box.scale,
