@@ -57,6 +57,7 @@ def align(capture: Capture, motion: Simulated) -> tuple[float, bool]:
             f"the capture lasts {np.ptp(capture.time):.4g} s and the motion {last - first:.4g} s; "
             f"cut the capture to the part around the motion, or give `offset`."
         )
+    # all shifts by which they overlap, coarsely; then between the neighbours of the best
     shifts = np.linspace(low, high, 1 + int(np.ceil((high - low) / (last - first) * _SHIFTS_PER_MOTION)))
     costs = np.array([cost(shift) for shift in shifts])
     best = int(np.argmin(costs))
@@ -93,6 +94,7 @@ def _turn_cost(capture: Capture, motion: Simulated) -> Callable[[float], float]:
 
     def cost(shift: float) -> float:
         """Mean of `1 - cos(angle)`, about half the square of the angle, with the best frame of the cameras."""
+        # trace of G^T (mean of measured simulated^T) is largest at the sum of singular values (Kabsch)
         together = np.einsum("mab,mcb->ac", measured, at(time - shift)) / len(time)
         u, s, v = np.linalg.svd(together)
         return float(3 - s[0] - s[1] - s[2] * np.linalg.det(u @ v)) / 2

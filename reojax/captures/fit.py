@@ -159,15 +159,19 @@ class FitProblem:
         from scipy.spatial.transform import Rotation
 
         turned, effect = self._orientation(x) if moved is None else moved
+        # rotation vectors from where the robot should be seen, G R(t), to where it was
         when, edge, length = self._place(offset)
         residual = Rotation.from_matrix(
             self.measured @ (frame @ interpolate(self.time, turned)(when)).swapaxes(1, 2)
         ).as_rotvec()
+        # by the parameters: what all edges before have turned, and a share of the present one
         p = len(x)
         running = np.concatenate([np.zeros((1, 3, p)), np.cumsum(effect[..., :p] * self.scale, axis=0)])
         part = ((when - self.time[edge]) / length)[:, None, None]
         columns = [-frame @ ((1 - part) * running[edge] + part * running[edge + 1])]
+        # by the cameras' frame: a turn of it turns the residual back
         columns.append(np.broadcast_to(-np.eye(3), (len(when), 3, 3)))
+        # by the clock: the angular velocity on the present edge
         if self.clock:
             turn = Rotation.from_matrix(turned[edge + 1] @ turned[edge].swapaxes(1, 2)).as_rotvec()
             columns.append((turn / length[:, None] @ frame.T)[..., None])
@@ -186,8 +190,10 @@ class FitProblem:
 
     def push(self, state: FitState) -> np.ndarray:
         """(unknowns, m j): how the noise of each joint angle pushes the fit's normal equations."""
+        # normal equations by the residuals: J^T, in the base's frame, at the frames that were seen
         weight = np.zeros((len(self.time), 3, state.derivative.shape[-1]))
         weight[self.seen] = -state.frame.T @ state.derivative
+        # an edge turns all that follows, and moves with the joints at both of its ends
         later = np.cumsum(weight[:0:-1], axis=0)[::-1]
         ends = np.einsum("kxu,kxe->uke", later, state.joint_effect)
         joints = ends.shape[2] // 2

@@ -48,8 +48,10 @@ def edges_of(structure: Structure, geometry: Geometry, waypoints: Float[jax.Arra
 
 def _rounding(structure: Structure, geometry: Geometry, angle: Float[jax.Array, " j"]) -> Float[jax.Array, " p"]:
     """Bound on the rounding of a distance [m]: of lengths along the chain, and of the angles, up to `angle` [rad]."""
+    # of angles: how far a point moves for each radian
     joint = chains_of(structure).joint
     by_angle = jnp.where(joint >= 0, levers(structure, geometry) * angle[joint], 0).sum((1, 2)) if angle.size else 0
+    # of lengths: those along the chain to each link, and the capsule's own
     depth, reach = [0], [jnp.zeros((), geometry.axis.dtype)]
     for k, p in enumerate(structure.parent):
         depth.append(depth[p] + 1)
@@ -57,6 +59,7 @@ def _rounding(structure: Structure, geometry: Geometry, angle: Float[jax.Array, 
     link = np.array(structure.capsule_link, int)
     square = jnp.maximum((geometry.start**2).sum(1), (geometry.end**2).sum(1))
     extent = jnp.stack(reach)[link] + jnp.sqrt(square) + geometry.radius
+    # a rounding of both for each operation on the way
     pairs = np.array(structure.pairs, int).reshape(-1, 2)
     operations = 8 + 2 * np.array(depth)[link][pairs].max(1).astype(geometry.axis.dtype)
     return 8 * jnp.finfo(geometry.axis.dtype).eps * (operations * extent[pairs].sum(1) + by_angle)
@@ -83,14 +86,18 @@ def interval_bounds(
     joints, stretches, samples = theta.shape
     flat = pair_ends_from_between(structure, geometry, theta.reshape(joints, stretches * samples))
     ends = PairEnds(*(x.reshape(3, -1, stretches, samples) for x in flat))
+    # distances and directions at the samples
     w = jnp.stack(materialize(tuple(between(*ends))))
     square = dot(w, w)
     distance = jnp.sqrt(square)
     normal = w / jnp.sqrt(jnp.where(square > 0, square, 1))[None]
+    # least n . w at both ends of each interval, n halfway between the two directions
     halfway = _unit(normal[..., 1:] + normal[..., :-1])
     here = _support(halfway, PairEnds(*(x[..., :-1] for x in ends)))
     there = _support(halfway, PairEnds(*(x[..., 1:] for x in ends)))
+    # and what a point leaves its chord by, M h^2 / 8
     chord = jnp.minimum(here, there) - bend[..., None] * (width * width)[None] / 8
+    # less both radii, and rounding
     both = radii(structure, geometry)[:, None, None]
     return jnp.maximum(chord, 0) - both - rounding[:, None, None], distance - both
 

@@ -79,10 +79,12 @@ def chains_of(structure: Structure) -> Chains:
     """Find the chains of all pairs."""
     sides, frames = [], []
     for pair in structure.pairs:
+        # seen from the link in the middle, both sides are short
         chain = links_between(structure.parent, *(structure.capsule_link[c] for c in pair))
         middle = (len(chain) - 1) // 2
         frames.append(chain[middle])
         sides += [_joints(structure.parent, chain[middle::-1]), _joints(structure.parent, chain[middle:])]
+    # as arrays, filled up with -1
     longest = max((len(side) for side in sides), default=0)
     joint, link = (
         np.array([[item[k] for item in side] + [-1] * (longest - len(side)) for side in sides], int)
@@ -113,6 +115,7 @@ def levers(structure: Structure, geometry: Geometry) -> Float[jax.Array, "p 2 m"
         joint, link = chains.joint[:, :, m], chains.link[:, :, m]
         place = _place(geometry, joint, link)
         axis = geometry.axis[joint]
+        # to the next joint, or to both ends of the capsule beyond the last
         following = chains.joint[:, :, m + 1] if m + 1 < longest else np.full_like(joint, -1)
         to_next = _place(geometry, following, link) - place
         ends = [side[capsule] - place for side in (geometry.start, geometry.end)]
@@ -122,6 +125,7 @@ def levers(structure: Structure, geometry: Geometry) -> Float[jax.Array, "p 2 m"
             first, second, to_next = map(_length, vectors)
             return jnp.where(last, jnp.maximum(first, second), to_next + beyond)
 
+        # from the axis for this joint, from its place for those before it
         across = [v - (v * axis).sum(-1, keepdims=True) * axis for v in (*ends, to_next)]
         rho.append(jnp.where(joint < 0, 0, reach((across[0], across[1], across[2]))))
         beyond = jnp.where(joint < 0, 0, reach((ends[0], ends[1], to_next)))

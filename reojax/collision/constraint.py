@@ -71,6 +71,7 @@ def clearance_shortfall(
     if not structure.pairs:
         return jnp.zeros(0, dtype)
     further = jnp.zeros(len(structure.pairs), dtype) if more is None else jnp.asarray(more, dtype)
+    # least clearance of each edge, then rounded off over runs of edges
     least = _least(structure, samples, between, geometry, points[:-1], points[1:], jax.lax.stop_gradient(further))
     runs = np.array_split(np.arange(edges), min(edges, groups))
     rounded = [_ROUND * jax.nn.logsumexp(-least[run[0] : run[-1] + 1] / _ROUND) for run in runs]
@@ -147,12 +148,14 @@ def _closest(
         flat = pair_ends(structure, geometry, theta.reshape(len(theta), -1))
         return [x.reshape(*x.shape[:2], *share.shape) for x in flat]
 
+    # the nearest pair and sample of each edge
     share = jnp.broadcast_to(jnp.arange(samples + 1, dtype=start.dtype)[None] / samples, (edges, samples + 1))
     gap = (quick_distance(*ends_at(share)) - reserve[:, None, None]).swapaxes(0, 1)
     flat = gap.reshape(edges, -1).argmin(1)
     pair, nearest = flat // (samples + 1), flat % (samples + 1)
     place = nearest.astype(start.dtype)
     if samples >= _LONG:
+        # vertex of the parabola through it and its neighbours
         edge, middle = np.arange(edges), jnp.clip(nearest, 1, samples - 1)
         before, here, after = (gap[edge, pair, middle + by] for by in (-1, 0, 1))
         least, bend = gap[edge, pair, nearest], before - 2 * here + after
@@ -178,6 +181,8 @@ def _at(
     """Least clearance of the pairs at one place of each edge, rounded off, in units of the mean sum of two radii."""
     theta = start + (end - start) * share[:, None]
     gap = segment_distance(*pair_ends(structure, geometry, theta.T)) - (radii(structure, geometry) + more)[:, None]
+    # what lies between samples: the bound M h^2 / 8
     if between:
         gap = gap - between / (8 * samples**2) * acceleration_bound(structure, geometry, (end - start).T)
+    # soft minimum over the pairs, -r log sum exp(-gap / r)
     return -_ROUND * jax.nn.logsumexp(-gap / (_ROUND * _size(structure, geometry)), axis=0)

@@ -83,6 +83,7 @@ def nearest_points(robot: Robot, theta: ArrayLike, pair: int) -> Float[np.ndarra
         ends = pair_ends(structure_of(robot), geometry, np.asarray(theta, float)[:, None])
         s, t = (float(share) for share in closest_parameters(*(end[:, pair, 0] for end in ends)))
         a0, a1, b0, b1 = (np.asarray(end)[:, pair, 0] for end in ends)
+    # on the centre lines, and outwards from them by the radii along the line between
     inner = np.stack([a0 + s * (a1 - a0), b0 + t * (b1 - b0)])
     apart = inner[1] - inner[0]
     length = np.linalg.norm(apart)

@@ -182,11 +182,13 @@ def _search(
 def _look_at_all(structure: Structure, geometry: Geometry, edges: Edges, cells: int) -> _Search:
     """The search at its beginning: a bound for each of the `cells` of every edge, and the least sample between them."""
     count, dtype = edges.start.shape[1], edges.start.dtype
+    # postures at the ends of all cells (j, e, cells + 1)
     share = jnp.arange(cells + 1, dtype=dtype) / cells
     theta = edges.start[:, :, None] + edges.turn[:, :, None] * share[None, None]
     width = jnp.full((count, cells), 1 / cells, dtype)
     lower, sampled = interval_bounds(structure, geometry, theta, width, edges.bend, edges.rounding)
     place = jnp.arange(count, dtype=dtype)[:, None] + share[None]
+    # the cell of least bound is the first to be looked into
     low = lower.min(0).reshape(-1)
     done, proven, step = (jnp.full((), x, low.dtype) for x in (0, jnp.inf, 1 / _STEPS))
     return _Search(low, _least(sampled, place), low.argmin(), done, proven, step, jnp.zeros((), int))
@@ -207,9 +209,11 @@ def _look_ahead(structure: Structure, geometry: Geometry, edges: Edges, cells: i
     """The next `_STEPS` intervals of the present cell."""
     dtype = search.low.dtype
     edge, inside = search.cell // cells, (search.cell % cells).astype(dtype)
+    # postures at the ends of the intervals, held within the cell
     ahead = jnp.minimum(search.done + search.step * jnp.arange(_STEPS + 1, dtype=dtype), 1)
     share = (inside + ahead) / cells
     theta = edges.start[:, edge, None] + edges.turn[:, edge, None] * share[None]
+    # bounds of the intervals, and the samples between them
     width = (share[1:] - share[:-1])[None]
     bend = edges.bend[:, edge, None]
     lower, sampled = interval_bounds(structure, geometry, theta[:, None], width, bend, edges.rounding)

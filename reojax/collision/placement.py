@@ -67,6 +67,7 @@ def _link_poses(
     rotation = [jnp.broadcast_to(jnp.eye(3, dtype=theta.dtype)[:, :, None], (3, 3, samples))]
     origin = [jnp.zeros((3, samples), theta.dtype)]
     if parent:
+        # Rodrigues: e e^T + cos (1 - e e^T) + sin hat(e)
         sine, cosine = sincos(theta)
         e = geometry.axis
         x, y, z = e[:, 0], e[:, 1], e[:, 2]
@@ -74,6 +75,7 @@ def _link_poses(
         along = e[:, :, None] * e[:, None, :]
         across = jnp.eye(3, dtype=e.dtype)[None] - along
         turn = along[..., None] + cosine[:, None, None] * across[..., None] + sine[:, None, None] * hat[..., None]
+        # p_k = p_parent + R_parent anchor,  R_k = R_parent turn
         for k, p in enumerate(parent):
             origin.append(origin[p] + (rotation[p] * geometry.anchor[k][None, :, None]).sum(1))
             rotation.append((rotation[p][:, :, None] * turn[k][None]).sum(1) if p else turn[k])

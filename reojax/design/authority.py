@@ -71,12 +71,14 @@ def _weighted_authority(robot: Robot, path: Path, weight: Float[Array, " n"]) ->
     """The same with the weight of each node."""
     points = jnp.asarray(path.waypoints)
     edges = points.shape[0] - 1
+    # postures and rates in the middle of equal parts of each edge, and the base's orientation there
     fine = 2 * _NODES
     share = (np.arange(_NODES) + 0.5) / _NODES
     step = jnp.diff(points, axis=0)
     theta = points[:-1, None] + jnp.asarray(share, points.dtype)[None, :, None] * step[:, None]
     rotation = rotation_history(robot, path, samples=fine)[:-1].reshape(edges, fine, 3, 3)[:, 1::2]
     rates = jnp.broadcast_to(step[:, None], theta.shape)
+    # what a change of the joints there turns the end by, and its Gramian
     flat = [x.reshape(-1, *x.shape[2:]) for x in (theta, rates, rotation)]
     still = jnp.zeros(3, points.dtype)
     g, _ = jax.vmap(partial(turn_per_change, robot), (0, 0, 0, None))(flat[0], flat[1], flat[2], still)
@@ -86,6 +88,7 @@ def _weighted_authority(robot: Robot, path: Path, weight: Float[Array, " n"]) ->
 
 def _least_eigenvalue(matrix: Float[Array, "3 3"]) -> Float[Array, ""]:
     """From the angle of the characteristic cubic; its derivative is finite unless two eigenvalues meet."""
+    # eigenvalues mean + 2 r cos(f + 2 pi k / 3): r and f of the part without trace (Smith 1961)
     mean = jnp.trace(matrix) / 3
     off = matrix - mean * jnp.eye(3, dtype=matrix.dtype)
     size = (off * off).sum() / 6

@@ -76,6 +76,7 @@ def with_length(robot: Robot, link: int | str, factor: ArrayLike, *, along: Arra
         if direction.shape != (3,) or not direction.any() or not np.isfinite(direction).all():
             raise ValueError(f"`along` is {checks.shorten(along)}; it must be (3,), finite and not zero.")
         share = np.outer(direction, direction) / (direction @ direction)
+    # the body about its frame's origin, and the anchors of what it carries
     stretch = jnp.eye(3, dtype=jnp.result_type(scale)) + (scale - 1) * share
     robot = _stretch(robot, index, stretch, jnp.zeros(3, stretch.dtype))
     carried = np.array([parent == index for parent in robot.parent])[:, None]
@@ -95,12 +96,14 @@ def with_joint_inertia(robot: Robot, joint: int | str, inertia: ArrayLike) -> Ro
     axis, com = robot.axis[number], robot.com[link]
     along = axis[:, None] * axis[None, :]
     across = np.eye(3, dtype=along.dtype) - along
+    # e . I e + m |across|^2 goes with the square of the factor
     present = (along * robot.inertia[link]).sum() + robot.mass[link] * (com @ across @ com)
     return _stretch(robot, link, jnp.sqrt(wanted / present) * across + along, jnp.zeros_like(com))
 
 
 def _stretch(robot: Robot, link: int, stretch: jax.Array, fixed: jax.Array) -> Robot:
     """Stretch a link's body about the point `fixed`."""
+    # second moments of the mass, tr(I) / 2 - I, go with the stretch from both sides; inertia again, tr(S) - S
     inertia = robot.inertia[link]
     spread = 0.5 * jnp.trace(jnp.asarray(inertia)) * jnp.eye(3, dtype=inertia.dtype) - inertia
     spread = stretch @ spread @ stretch.T

@@ -49,6 +49,7 @@ def fourier_loops(robot: Robot, degree: int, *, samples: int = 64, start: ArrayL
         angle = 2 * np.pi * np.outer(np.arange(points) / points, np.arange(1, degree + 1))
         return np.concatenate([np.cos(angle) - 1, np.sin(angle)], axis=1)
 
+    # the limits at many points, within the points of the path
     dense = basis(_OVERSAMPLING * degree)
     bound = np.repeat(half[None], 2 * degree, axis=0).ravel()
     loops = _sample(f"Fourier loop of degree {degree}", robot, origin, basis(samples), np.tile(half, 2 * degree), name)
@@ -59,6 +60,7 @@ def fourier_loops(robot: Robot, degree: int, *, samples: int = 64, start: ArrayL
         return jnp.concatenate([points - room, -points - room]).reshape(-1)
 
     def random(rng: np.random.Generator, starts: int) -> np.ndarray:
+        # coefficients that fall with the frequency, shrunk to what the limits leave
         fall = 1.0 / np.tile(np.arange(1, degree + 1), 2)
         x = rng.uniform(-1, 1, (starts, 2 * degree, robot.joints)) * (fall[:, None] * half)
         size = np.abs(np.einsum("sn,mnj->msj", dense, x)).max(1)
@@ -87,8 +89,10 @@ def spline_loops(robot: Robot, points: int, *, samples: int = 64, start: ArrayLi
     _positive("points", points, 4)
     _positive("samples", samples, points)
     low, high, origin = limits_of(robot, start)
+    # distance from each sample to each control point, in intervals, around the loop
     offset = np.arange(samples)[:, None] * points / samples - np.arange(points)[None]
     distance = np.abs((offset + points / 2) % points - points / 2)
+    # the cubic B-spline: (4 - 6 d^2 + 3 d^3) / 6 up to 1, (2 - d)^3 / 6 up to 2
     near, far = (4 - 6 * distance**2 + 3 * distance**3) / 6, np.maximum(2 - distance, 0) ** 3 / 6
     weights = np.where(distance < 1, near, far)
     spread = np.repeat(np.maximum(high - origin, origin - low)[None], points, axis=0).ravel()
@@ -115,6 +119,7 @@ def _sample(kind: str, robot: Robot, origin: np.ndarray, basis: np.ndarray, boun
         return Path(jnp.concatenate([first, shape(x)[1:] + first, first]))
 
     def travel(x: Array) -> Array:
+        # |d| of each edge rounded off, sqrt(d^2 + e^2) - e
         points = shape(x)
         step = points - jnp.roll(points, 1, axis=0)
         return (jnp.sqrt(step * step + EPSILON**2) - EPSILON).sum()

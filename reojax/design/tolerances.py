@@ -74,6 +74,7 @@ def perturb(robot: Robot, sources: Sources, errors: Float[Array, " k"]) -> Robot
 
     for field, values in sources.tolerances:
         width = {"com": 3, "anchor": 3, "axis": 2}.get(field, 1)
+        # this field's errors, one row for each link or joint
         part = moved[place : place + width * len(values)].reshape(len(values), width)
         place += width * len(values)
         factor = jnp.exp(part[:, 0])

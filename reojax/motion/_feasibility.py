@@ -70,6 +70,7 @@ def restore_feasibility(
     lower, upper, scale = box
     x = start
     for _ in range(_STEPS):
+        # conditions where the joints are farthest; the rotation exactly
         trajectory = build(x)
         now = Linearised(*(np.array(part) for part in linearised(x, farthest(trajectory))))
         if now.equality.size:
@@ -77,6 +78,7 @@ def restore_feasibility(
         now = now._replace(inequality=now.inequality + _CLEAR)
         if np.abs(now.equality).max(initial=0) < 1e-12 and now.inequality.max(initial=0) <= 0:
             break
+        # the least step that to first order meets them all
         x = np.clip(x + scale * least_norm_step(now, scale, (lower - x) / scale, (upper - x) / scale), lower, upper)
     return x
 
@@ -107,6 +109,7 @@ def beyond_limits(robot: Robot, trajectory: Trajectory, share: Float[Array, "2 p
         share: where in each piece each joint is looked at, against its upper and its lower limit.
         ends: the limits.
     """
+    # Horner's rule at those shares
     time = jnp.asarray(share) * jnp.diff(trajectory.breaks)[None, :, None]
     place = jnp.zeros_like(time)
     for row in range(trajectory.coefficients.shape[1])[::-1]:
@@ -127,6 +130,7 @@ def farthest(trajectory: Trajectory) -> Float[np.ndarray, "2 p j"]:
     powers = powers * lengths[:, None, None] ** np.arange(powers.shape[1])[None, :, None]  # of the share
     share = np.zeros((2, len(lengths), trajectory.joints))
     for p, k in np.ndindex(share.shape[1:]):
+        # ends of the piece, and where the rate is zero
         place = np.polynomial.Polynomial(powers[p, :, k])
         turns = place.deriv().trim().roots()
         at = np.array([0.0, 1.0, *np.clip(turns[abs(turns.imag) < 1e-6].real, 0, 1)])

@@ -67,6 +67,7 @@ def overlap(
     total = float(durations.sum())
     start = np.concatenate([[0.0], np.cumsum(durations)])[edge]
     count = len(moves)
+    # beginnings, lengths, factors, duration: as the edges one after another, and how far from that
     joints = robot.joints
     first = np.concatenate([start, durations[edge], np.ones(joints), [total]])
     low = np.concatenate([np.zeros(count), np.full(count, 0.05 * total / path.edges), np.full(joints + 1, 0.2)])
@@ -113,11 +114,13 @@ def free_law(
     least = minimum_time(robot, path, motors, trapezoid(), clearance=clearance)
     have = np.full(len(robot.collision_pairs), np.inf if least.clearance is None else float(least.clearance))
     apart = None if clearance is None else Apart(float(clearance), have)  # every law passes the whole path
+    # each edge's law to begin with: a trapezoid's places at even times
     edges = path.edges
     corners = np.asarray(path.waypoints, float)
     edge = along(Path(np.array([[0.0], [1.0]])), trapezoid(), np.ones(1))
     place = np.array([float(edge.at(u).theta[0]) for u in np.arange(1, points + 1) / (points + 1)])
 
+    # durations and places
     durations = 1.2 * np.asarray(least.durations, float)
     first = np.concatenate([durations, np.tile(place, edges)])
     low = np.concatenate([0.2 * durations, np.full(edges * points, -0.2)])
@@ -172,6 +175,7 @@ def fastest_loop(
     motors = check_motors(motors, robot)
     least = minimum_time(robot, near, motors)
     apart = _apart(robot, clearance, {"the start of `near`": np.asarray(near.waypoints[0], float)})
+    # the path to start from, by even times, and starts strewn around it
     begun = along(near, quintic(), np.asarray(least.durations))
     total = 1.2 * float(least.duration)
     places = np.array([np.asarray(begun.at(t).theta) for t in np.linspace(0, float(least.duration), knots + 1)])
@@ -179,6 +183,7 @@ def fastest_loop(
     reach = np.minimum(np.asarray(robot.upper), np.pi) - np.maximum(np.asarray(robot.lower), -np.pi)
     first = np.tile(np.concatenate([np.full(knots, total / knots), places[1:-1].ravel()]), (starts, 1))
     first[1:, knots:] += 0.05 * rng.normal(size=(starts - 1, first.shape[1] - knots)) * np.tile(reach, knots - 1)
+    # times between the knots, and postures at them
     low = np.concatenate([np.full(knots, 0.1 * total / knots), np.tile(np.asarray(robot.lower, float), knots - 1)])
     high = np.concatenate([np.full(knots, 3 * total / knots), np.tile(np.asarray(robot.upper, float), knots - 1)])
     scale = np.concatenate([np.full(knots, total / knots), np.tile(0.3 * reach, knots - 1)])

@@ -206,12 +206,14 @@ def nodes_of_half(nodes: _Node) -> _Node:
 def nodes_of(robot: Robot, trajectory: Trajectory, steps: int) -> tuple[Array, Array, _Node]:
     """Times, lengths of all steps, and what counts at the start, the middle and the end of each."""
     dtype = trajectory.breaks.dtype
+    # start, middle and end of every step (p, s, 3)
     piece = jnp.diff(trajectory.breaks)
     share = (jnp.arange(steps, dtype=dtype)[:, None] + jnp.array([0, 0.5, 1], dtype)[None]) / steps
     within = share[None] * piece[:, None, None]
     state = jax.vmap(jax.vmap(jax.vmap(polynomial, (None, 0)), (None, 0)))(trajectory.coefficients, within)
 
     def node(theta: Array, theta_dot: Array) -> _Node:
+        # A^-1 B theta_dot, A^-1, and where the base's centre lies from the robot's
         pose = kinematics(robot, theta)
         return _Node(*velocity_by_momentum(robot, pose, theta_dot), robot.com[0] - pose.com[0])
 

@@ -46,11 +46,13 @@ def least_jerk(lengths: Float[Array, " p"], values: Float[Array, "p+1 m"]) -> Fl
     dtype = jnp.result_type(lengths, values)
     h, points = jnp.asarray(lengths, dtype), jnp.asarray(values, dtype)
     count = h.shape[0]
+    # jerk of each piece as a form in (s, s', s'') at both of its ends, and their sum over all pieces
     ends = jax.vmap(lambda scale: scale[:, None] * jnp.asarray(_FORM, dtype) * scale[None])(_scales(h))
     ends = ends / (h**5)[:, None, None]
     total = jnp.zeros((3 * (count + 1), 3 * (count + 1)), dtype)
     for i in range(count):
         total = total.at[3 * i : 3 * i + 6, 3 * i : 3 * i + 6].add(ends[i])
+    # rates and accelerations inside that make it least; at rest at both ends
     free = np.array([3 * i + order for i in range(1, count) for order in (1, 2)], int)
     states = jnp.zeros((count + 1, 3, points.shape[1]), dtype).at[:, 0].set(points)
     if len(free):
@@ -59,6 +61,7 @@ def least_jerk(lengths: Float[Array, " p"], values: Float[Array, "p+1 m"]) -> Fl
         even = total[np.ix_(free, free)] / (size[:, None] * size[None, :])
         found = solve_positive(even, pull / size[:, None]) / size[:, None]
         states = states.at[1:-1, 1:].set(found.reshape(count - 1, 2, -1))
+    # coefficients from both ends of each piece, by the share of it; then by time
     pairs = jnp.concatenate([states[:-1], states[1:]], axis=1)
     unit = jnp.einsum("ab,pb,pbm->pam", jnp.asarray(_HERMITE, dtype), _scales(h), pairs)
     return unit / jax.vmap(lambda step: step ** jnp.arange(6))(h)[:, :, None]

@@ -87,6 +87,7 @@ def _stretches(
     """Where the stretches of each piece begin and end, as shares of it, and by how much chords mislead at most [m]."""
     begin, most = [], 0.0
     for piece in powers:
+        # what a chord misses falls with the square of the number of stretches
         count = _FIRST
         while True:
             share = np.arange(count + 1) / count
@@ -101,12 +102,14 @@ def _stretches(
 
 def _off_chord(piece: Float[np.ndarray, "d j"], share: Float[np.ndarray, " s+1"]) -> Float[np.ndarray, "s j"]:
     """Bound on how far each joint is off the chord of each stretch of a piece [rad]."""
+    # coefficients by the share of each stretch
     order = np.arange(len(piece))
     step = np.diff(share)
     choose = np.array([[comb(n, k) for n in order] for k in order], float)  # of the powers about another point
     back = np.maximum(order[None] - order[:, None], 0)
     moved = choose[None] * share[:-1, None, None] ** back[None]
     there = (moved @ piece) * step[:, None, None] ** order[None, :, None]
+    # Bernstein's: a polynomial lies between the least and the largest of them, and so does its way off the chord
     bernstein = np.array([[comb(i, k) / comb(order[-1], k) for k in order] for i in order])
     points = bernstein @ there
     along = (order / max(order[-1], 1))[None, :, None]

@@ -90,12 +90,18 @@ def _descend(
 
         def step(carry: Any, _: None) -> tuple[Any, None]:
             x, memory, best, least, slope, first = carry
+            # value and gradient; a gradient that is not finite does not count
             now, gradient = value(x)
             gradient = jnp.where(jnp.isfinite(gradient), gradient, 0.0)
             first = jnp.where(first > 0, first, jnp.abs(gradient).max())
+            # stationarity: how far a gradient step would go within the box, by the first gradient's size
+            inside = jnp.clip(x - gradient / jnp.where(first > 0, first, 1.0), low, high)
+            pressed = jnp.abs(x - inside).max()
+            # the best point so far
             better = now < least
-            pressed = jnp.abs(x - jnp.clip(x - gradient / jnp.where(first > 0, first, 1.0), low, high)).max()
-            best, least, slope = (jnp.where(better, a, b) for a, b in ((x, best), (now, least), (pressed, slope)))
+            best = jnp.where(better, x, best)
+            least, slope = jnp.where(better, now, least), jnp.where(better, pressed, slope)
+            # Adam's step, projected onto the box
             change, memory = optimiser.update(gradient, memory)
             return (jnp.clip(x + change, low, high), memory, best, least, slope, first), None
 

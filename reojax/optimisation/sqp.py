@@ -57,17 +57,20 @@ def minimise(problem: ScaledProblem, x: Float[np.ndarray, "m n"], report: Callab
     ahead = problem.derivatives(x, np.arange(len(x)))
     run = begin(problem, x, *ahead)
     while (going := np.flatnonzero(run.status == RUNNING)).size:
+        # values and derivatives at the trial points, scaled
         values, slopes = problem.derivatives(run.trial[going], going) if run.steps.any() else _rows_of(ahead, going)
         values = Values(values.cost / run.cost_scale[going], values.rows / run.row_scale[going])
         gradient = slopes.gradient / run.cost_scale[going, None]
         jacobian = slopes.jacobian / run.row_scale[going, :, None]
+        # good enough: Armijo's condition for the merit
         finite = all_finite(values, gradient, jacobian)
         reached = merit(values.cost, values.rows, run.penalty[going], run.restoring[going], run.equalities)
         enough = run.here[going] + SUFFICIENT * run.reduction[going] + run.rounding[going]
         taken = finite & (run.chosen[going] | (reached <= enough))
-
+        # go there, or look for a better point on the way
         _move(problem, run, going[taken], values, gradient, jacobian, taken)
         failed = _search(problem, run, going[~taken], values.rows[~taken])
+        # new quadratic programs where something has changed
         ready = np.concatenate([going[taken], failed])
         ready = ready[run.status[ready] == RUNNING]
         out = run.steps[ready] >= problem.max_steps
@@ -104,10 +107,11 @@ def _move(
     who = to[measured]
     run.hessian[who], run.fresh[who] = update(run.hessian[who], run.fresh[who], change[measured], turn[measured])
     run.damping[to], run.chosen[to] = 1.0, False
-
+    # steps that lead nowhere
     short = begun & (np.abs(change).max(1, initial=0.0) < _STILL)
     run.stalled_steps[to] = np.where(short, run.stalled_steps[to] + 1, 0)
     run.status[to[run.stalled_steps[to] >= _PATIENCE]] = Status.STALLED
+    # both tolerances met, twice
     run.slope[to] = stationarity_of(problem, run, to)
     met = within_tolerances(problem, run, to)
     run.status[to[met & run.arrived[to]]] = Status.CONVERGED
@@ -127,6 +131,7 @@ def _search(problem: ScaledProblem, run: Iterates, who: np.ndarray, ahead: np.nd
     failed = np.concatenate([who[lost], look[~found]])
     run.status[failed[within_tolerances(problem, run, failed)]] = Status.CONVERGED
     failed = failed[run.status[failed] == RUNNING]
+    # B anew
     run.damping[failed] = np.where(run.fresh[failed], 10 * run.damping[failed], 1.0)
     run.hessian[failed] = run.damping[failed, None, None] * np.eye(run.x.shape[1])
     run.fresh[failed], run.chosen[failed] = True, False
@@ -150,17 +155,20 @@ def _solve(problem: ScaledProblem, run: Iterates, who: np.ndarray) -> None:
             run.multipliers[i] = answer.multipliers
             run.multipliers[i, run.equalities :] = np.maximum(answer.multipliers[run.equalities :], 0.0)
     run.steps[who] += 1
+    # penalties no less than the multipliers, and slow to fall (Powell)
     size = np.abs(run.multipliers[who])
     run.penalty[who] = np.maximum(size, 0.5 * (run.penalty[who] + size))
     run.slope[who] = np.minimum(run.slope[who], stationarity_of(problem, run, who))
+    # a step that short, at a point that meets the tolerances, is the end
     near = np.abs(run.step[who]).max(1, initial=0.0) <= _ARRIVED
     run.status[who[near & ~run.restoring[who] & within_tolerances(problem, run, who)]] = Status.CONVERGED
-
+    # what the merit is, what is promised of it, and what of it is rounding
     run.reduction[who] = predict(run, who)
     run.here[who] = merit(run.f[who], run.c[who], run.penalty[who], run.restoring[who], run.equalities)
     size = np.where(run.restoring[who], 0.0, np.abs(run.f[who]) + run.penalty[who].sum(1) + 1)
     run.rounding[who] = 50 * problem.precision * size
     run.trial[who] = np.clip(run.x[who] + run.step[who], problem.lower[who], problem.upper[who])
+    # a least of the violations that is none of the problem
     flat = run.restoring[who] & (-run.reduction[who] <= _FLAT * run.here[who]) & (run.status[who] == RUNNING)
     for i in who[flat]:
         _move_aside(problem, run, i)
@@ -176,9 +184,11 @@ def _move_aside(problem: ScaledProblem, run: Iterates, i: int) -> None:
     nearest = run.nearest[i]
     if nearest is None or found < nearest[0]:
         run.nearest[i] = found, run.x[i].copy(), float(run.f[i]), run.c[i].copy()
+    # the nearest so far is kept; too often is the end
     if run.restarts[i] >= RESTARTS:
         run.status[i] = Status.INFEASIBLE
         return
+    # a random point around, and all that was learnt forgotten
     free = problem.upper[i] > problem.lower[i]
     reach = np.where(free, np.minimum(problem.upper[i] - problem.lower[i], 1.0), 0.0)
     aside = np.random.default_rng(run.restarts[i]).uniform(-1, 1, reach.shape)

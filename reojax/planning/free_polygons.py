@@ -107,16 +107,19 @@ def _polygons_of(robot: Robot, joints: tuple[int, ...], moves: np.ndarray, corne
         return x[:-1].reshape(corners, count)
 
     def travel(x: Array, aim: Aim) -> Array:
+        # |d| of every edge and joint rounded off, with those that follow a joint
         first, last = aim.ends[0][place], aim.ends[1][place]
         edges = jnp.diff(jnp.concatenate([first[None], inner(x), last[None]]), axis=0)
         rounded = jnp.sqrt(edges * edges + aim.rounding**2) - aim.rounding
         return aim.short * (rounded * weight[None]).sum() - aim.far * x[-1]
 
     def points(x: Array, aim: Aim) -> Array:
+        # joints that do not move stay as at the start
         base = aim.ends[0] - moves @ aim.ends[0][place]
         return jnp.concatenate([aim.ends[:1], base[None] + inner(x) @ moves.T, aim.ends[1:]])
 
     def miss(x: Array, aim: Aim) -> Array:
+        # log of target^T R, the target turned on about the axis
         target = aim.target @ so3.exp(x[-1] * aim.axis)
         return so3.log(target.T @ net_rotation(robot, Path(points(x, aim)), steps=COARSE))
 

@@ -83,6 +83,7 @@ def freedom_of(
             f"joint {robot.joint_names[joint]!r} goes from {first[joint]:.6g} to {last[joint]:.6g} rad "
             "from `start` to `end`, but is not among the `joints` that move."
         )
+    # limits of what moves independently, no wider than a reasonable path needs, both ends within
     reach = [_own_range(robot, joint, coupled, low, high) for joint in moving]
     box = np.array(reach).reshape(-1, 2).T
     ends = np.stack([first, last])[:, list(moving)]

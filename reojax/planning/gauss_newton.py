@@ -48,6 +48,7 @@ def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Iterate:
         i, x, tried, at, strength, before = state
         # keep what was tried if it is better, and trust the linear model more or less by that
         then = miss(table, word, tried)
+        # taken if it is nearer; the damping follows
         better = then.square < at.square
         before = jnp.stack([at.square, before[0]])
         strength = jnp.clip(jnp.where(better, 0.2 * strength, 6 * strength), 1e-4, 1e6)

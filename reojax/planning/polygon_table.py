@@ -56,6 +56,7 @@ class PolygonTable(NamedTuple):
 
     def farthest_rows(self, axis: Float[np.ndarray, "3"], count: int) -> np.ndarray:
         """Their rows, the most promising first, of either kind in turn."""
+        # sin(f / 2) of the turn, along the axis and across it
         half = np.where(self.turns[0] < 0, -1, 1) * self.turns[1:]
         along = axis @ half
         across = np.sqrt(((half - along * axis[:, None]) ** 2).sum(0))
@@ -83,10 +84,12 @@ def _table(polygons: Polygons, freedom: Freedom, seed: int) -> PolygonTable:
     place = list(freedom.joints)
     first, last = freedom.start[place], freedom.end[place]
     away = np.concatenate([_anyhow(rng, freedom, first, corners), _rectangles(rng, freedom, first, corners)])
+    # half of them shrunk by up to a thousand, drawn onto the straight way from start to end
     size = np.where(rng.random(len(away)) < 0.5, 1.0, 10.0 ** rng.uniform(-3, 0, len(away)))
     onward = np.linspace(0, 1, corners + 2)[1:-1, None] * (last - first)
     x = np.clip(first + onward + size[:, None, None] * away, freedom.low, freedom.high)
     x = np.pad(x.reshape(len(x), -1), ((0, 0), (0, 1)))
+    # what they turn the base by, and their travel
     paths = polygons.paths(x, freedom)
     turns = quaternions.from_matrices(polygons.rotations(paths, COARSE))
     return PolygonTable(x, turns, np.abs(np.diff(paths, axis=1)).sum((1, 2)))
@@ -98,6 +101,7 @@ def _anyhow(rng: np.random.Generator, freedom: Freedom, first: np.ndarray, corne
     How many move, three joints or all of them, differs from polygon to polygon.
     """
     count = len(first)
+    # how likely a joint moves on an edge, for each polygon
     share = 0.5 * rng.uniform(min(1.0, 3 / max(count, 1)), 1.0, (_RANDOM, 1))
     angles = rng.uniform(freedom.low, freedom.high, (corners, _RANDOM, count)) - first
     points = [np.zeros((_RANDOM, count))]
@@ -114,11 +118,13 @@ def _rectangles(rng: np.random.Generator, freedom: Freedom, first: np.ndarray, c
     loops, count = (corners + 1) // 4, len(first)
     if not loops or not count:
         return _anyhow(rng, freedom, first, corners)
+    # up to three joints, or half of them, move first, as many others second
     order = rng.random((_RANDOM, loops, count)).argsort(-1)
     most = np.minimum(3, 1 + count // 2)
     one = order < rng.integers(1, most + 1, (_RANDOM, loops, 1))
     other = ~one & (order < one.sum(-1, keepdims=True) + rng.integers(1, most + 1, (_RANDOM, loops, 1)))
     angles = rng.uniform(freedom.low, freedom.high, (_RANDOM, loops, count)) - first
+    # the four corners of each rectangle; what is left of the corners stays at the start
     shape = np.stack([one, one | other, other, np.zeros_like(one)], axis=2)
     points = (shape * angles[:, :, None]).reshape(_RANDOM, 4 * loops, count)
     return np.pad(points, ((0, 0), (0, 1), (0, 0)))[:, np.minimum(np.arange(corners), 4 * loops)]

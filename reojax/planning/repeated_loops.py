@@ -139,17 +139,21 @@ def _splits(one: Units, targets: np.ndarray, most: int) -> tuple[np.ndarray, np.
     who = np.repeat(np.arange(m), len(_PATTERNS) * _STARTS)
     target = targets[:, who]
     used = kind >= 0
+    # numbers of loops in units of a half angle of one radian
     size = np.sqrt((one.turn**2).sum(0)).max(1)
     scale = np.where(used, 1 / np.maximum(size, 1e-9)[np.maximum(kind, 0)], 0.0)
     n = rng.uniform(-1.5, 1.5, kind.shape) * scale
     best, least = n.copy(), np.full(n.shape[1], np.inf)
     for i in range(120):
+        # J J^T of the scaled numbers
         residual, jacobian = _miss(one, kind, n, target)
         weighted = jacobian * scale[None]
         matrix = np.einsum("iks,jks->sij", weighted, weighted) + 1e-9 * np.eye(3)
+        # the fewest loops that reach the target so far
         total = np.abs(n).sum(0)
         better = ((residual**2).sum(0) < 1e-8) & (total < least)
         best[:, better], least[better] = n[:, better], total[better]
+        # towards fewer loops, by less and less, and onto the target: d - J^T (J J^T)^-1 (J d + r)
         downhill = -0.15 * np.sign(n) * used * (i >= 20) * (1 - i / 120)
         back = np.einsum("iks,ks->si", weighted, downhill) + residual.T
         force = np.linalg.solve(matrix, back[..., None])[..., 0]
@@ -166,18 +170,22 @@ def _splits(one: Units, targets: np.ndarray, most: int) -> tuple[np.ndarray, np.
 
 def _miss(one: Units, kind: np.ndarray, n: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Residual (3, s) and its derivatives (3, 6, s) by the numbers of loops."""
+    # quaternions of n loops that turn by the vector 2 turn: (cos n a, sin(n a) / a turn)
     turn = one.turn[:, np.maximum(kind, 0), (n < 0).astype(int)] * np.where(n < 0, -1.0, 1.0) * (kind >= 0)
     angle = np.sqrt((turn**2).sum(0))
     sine = np.where(angle > 0, np.sin(n * angle) / np.where(angle > 0, angle, 1.0), n)
     q = np.concatenate([np.cos(n * angle)[None], sine * turn])
+    # products from the front, the target's inverse first, and from the back
     before = [np.stack(quaternions.inverse(target))]
     for i in range(len(n)):
         before.append(np.stack(quaternions.product(before[-1], q[:, i])))
     after = [np.array([1.0, 0, 0, 0])[:, None] * np.ones_like(n[0])]
     for i in reversed(range(1, len(n))):
         after.append(np.stack(quaternions.product(q[:, i], after[-1])))
+    # twice the vector part of what is left, on the side where the scalar is positive
     end = before.pop()
     sign = np.where(end[0] < 0, -2.0, 2.0)
+    # dq / dn = q (0, turn), between what comes before and after
     rate = [np.concatenate([0 * angle[:1], turn[:, i]]) for i in range(len(n))]
     columns = [
         np.stack(quaternions.product(quaternions.product(b, quaternions.product(q[:, i], r)), a))[1:]

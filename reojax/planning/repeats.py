@@ -19,6 +19,7 @@ _TRIES = 12
 def repeated(search: Search, targets: np.ndarray, runs: np.ndarray, hints: np.ndarray | None = None) -> np.ndarray:
     """Polygons (m, n) whose `runs`-th powers are the targets (m, 3, 3), or as near as can be found."""
     x, error = search.table.x[:1].repeat(len(targets), 0), np.full(len(targets), np.inf)
+    # of each root in turn, for what the ones before have not reached
     for turns in _ROOTS:
         root = roots(targets, runs, turns)
         able = (runs > 1) & (np.abs(_angle(targets) + 2 * np.pi * turns) < np.pi * runs) if turns else runs > 0
@@ -39,6 +40,7 @@ def least_repeats(search: Search, targets: np.ndarray) -> tuple[np.ndarray, np.n
     How far one loop within the limits can turn the base about the target's axis is found first; it says how many
     runs are needed at the least. Powers of a loop keep its axis, so no other loop will do (a half turn apart).
     """
+    # as many runs as the farthest turn about the axis takes, then more
     angle = _angle(targets)
     axis = quaternions.from_matrices(targets)[1:].T
     axis = axis / np.maximum(np.sqrt((axis**2).sum(1, keepdims=True)), np.finfo(float).tiny)
@@ -60,6 +62,7 @@ def least_repeats(search: Search, targets: np.ndarray) -> tuple[np.ndarray, np.n
 
 def roots(targets: np.ndarray, runs: np.ndarray, turns: int = 0) -> np.ndarray:
     """Rotations (m, 3, 3) about the targets' axes whose `runs`-th powers they are: `(angle + 2 pi turns) / runs`."""
+    # (cos f, sin f e) to (cos f', sin f' e), f' = (f + pi turns) / runs
     q = quaternions.from_matrices(targets)
     sine = np.sqrt((q[1:] ** 2).sum(0))
     half = (np.arctan2(sine, q[0]) + np.pi * turns) / runs

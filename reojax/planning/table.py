@@ -84,6 +84,7 @@ def tabulate(robot: Robot, layout: Layout, box: AmplitudeBox) -> Table:
     kinds, d = box.low.shape
     widest = (box.high - box.low).max(0)
     counts = [int(np.clip(np.ceil(w / _CELL) + 1, _FEWEST_NODES[d], _MOST_NODES[d])) for w in widest]
+    # rotations at the nodes, of signs that do not jump
     values = []
     for kind in range(kinds):
         axes = [np.linspace(a, b, n) for a, b, n in zip(box.low[kind], box.high[kind], counts, strict=True)]
@@ -92,6 +93,7 @@ def tabulate(robot: Robot, layout: Layout, box: AmplitudeBox) -> Table:
         q = true_rotations(robot, layout, np.stack([x[0], x[1], last])).reshape(4, *counts)
         values.append(_continuous(q, int(np.abs(axes[1]).argmin())))
     coefficients = np.stack(values, axis=1)
+    # B-splines along one amplitude after the other
     for axis in range(d):
         coefficients = np.moveaxis(_spline(np.moveaxis(coefficients, 2 + axis, 0)), 0, 2 + axis)
     return Table(coefficients, box.low, (box.high - box.low) / (np.array(counts) - 1))
@@ -111,6 +113,7 @@ def _continuous(q: np.ndarray, start: int) -> np.ndarray:
 def _spline(values: np.ndarray) -> np.ndarray:
     """Coefficients (n + 2, ...) of the cubic spline through `values` (n, ...), with not-a-knot ends."""
     n = len(values)
+    # (c_i-1 + 4 c_i + c_i+1) / 6 at each node; no jump of the third derivative at the last but one on each side
     matrix = np.zeros((n + 2, n + 2))
     for row in range(n):
         matrix[row, row : row + 3] = np.array([1, 4, 1]) / 6

@@ -47,10 +47,12 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
 
     def stretch(link: int, axis: Any, point: Any) -> tuple[Any, Any, Any]:
         """Centre of mass and inertia, polynomials in the factor by which the mass moves; and the capsules' ends."""
+        # parts of the centre of mass along the axis, which stay, and across it, which move
         along = axis[:, None] * axis[None, :]
         across = np.eye(3, dtype=com.dtype) - along
         lever = com[link] - point
         still, moving = point + along @ lever, across @ lever
+        # the inertia about the axis, e . I e + m |across|^2, goes with the square of the factor
         factor = xp.sqrt(wanted / cast((along * moment[link]).sum() + mass[link] * (moving @ moving)))
 
         def inertia(left: Any, right: Any) -> Any:
@@ -58,6 +60,7 @@ def with_end_inertia(robot: Robot, inertia: ArrayLike) -> Robot:
             part = left @ (moment[link].trace() / 2 * np.eye(3, dtype=com.dtype) - moment[link]) @ right
             return cast(part.trace() * np.eye(3, dtype=com.dtype) - part)
 
+        # the link's own capsules go with the mass
         own = np.array([on == link for on in robot.capsule_link], bool)[:, None]
         shapes = [xp.where(own, (factor - 1) * cast((x - point[None]) @ across), 0) for x in (start, end)]
         mixed = inertia(along, across) + inertia(across, along)
