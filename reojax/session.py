@@ -120,7 +120,7 @@ def _forget_damaged(folder: Path) -> None:
     if not _folders:
         show = warnings.showwarning
 
-        def told(message: Warning | str, *rest: Any, **more: Any) -> None:
+        def show_others(message: Warning | str, *rest: Any, **more: Any) -> None:
             found = re.match(r"Error reading persistent compilation cache entry for '(\w+)'", str(message))
             if found is None:
                 return show(message, *rest, **more)
@@ -128,7 +128,7 @@ def _forget_damaged(folder: Path) -> None:
                 file.unlink(missing_ok=True)
             return None
 
-        warnings.showwarning = told
+        warnings.showwarning = show_others
     _folders.add(folder)
     warnings.filterwarnings("always", "Error reading persistent compilation cache entry", UserWarning)
 

@@ -98,7 +98,7 @@ def moved(given: Numbers) -> reojax.Trajectory:
 
 
 def spread_of(given: Numbers) -> Any:
-    return design.spread(given.robot, given.path, {"mass[1]": 1e-3}, draws=4)
+    return design.spread(given.robot, given.path, {"mass": 1e-3}, draws=4)
 
 
 KINDS: dict[str, Callable[[Numbers], Any]] = {

@@ -22,12 +22,12 @@ def in_double(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answ
     """Let a function of the host, outside of transformations, compute in float64 whatever JAX's default."""
 
     @wraps(function)
-    def computed(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
+    def compute(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
         args, kwargs = own_copies((args, kwargs))
         with jax.enable_x64(True):
             return function(*args, **kwargs)
 
-    return computed
+    return compute
 
 
 def own_copies(tree: Tree) -> Tree:

@@ -34,11 +34,11 @@ def pair_ends_from_between(structure: Structure, geometry: Geometry, theta: Floa
     frame = chains_of(structure).frame
     back, home = rotation[frame], origin[frame].swapaxes(0, 1)  # (p, 3, 3, s), (3, p, s)
 
-    def seen(point: jax.Array) -> jax.Array:
+    def from_frame(point: jax.Array) -> jax.Array:
         from_home = (point - home).swapaxes(0, 1)
         return (back * from_home[:, :, None]).sum(1).swapaxes(0, 1)
 
-    return PairEnds(*map(seen, _of_pairs(structure, *_ends(structure, geometry, poses))))
+    return PairEnds(*map(from_frame, _of_pairs(structure, *_ends(structure, geometry, poses))))
 
 
 def _of_pairs(structure: Structure, start: jax.Array, end: jax.Array) -> PairEnds:

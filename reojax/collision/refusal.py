@@ -23,7 +23,7 @@ def require_clearance(robot: Robot, path: Path, clearance: ArrayLike) -> PathCle
     """
     if not is_concrete((robot, path)):
         raise ValueError("`clearance` is asked for on traced numbers; call `path_clearance`, which takes them.")
-    wanted = _asked(robot, clearance)
+    wanted = _check_margin(robot, clearance)
     least = path_clearance(robot, path)
     if not least.distance >= wanted:
         where = f"{pair_name(robot, int(least.pair))}, {float(least.at):.3f} edges along it"
@@ -44,7 +44,7 @@ def check_clearance(
         ValueError: naming the pair, if the margin is no number from 0 up, the robot has no pairs, or a posture has not
             that much clearance or is in contact already.
     """
-    wanted = _asked(robot, margin)
+    wanted = _check_margin(robot, margin)
     have = [np.asarray(clearance_at(robot, theta), float) for theta in postures.values()]
     for name, here in zip(postures, have, strict=True):
         worst = int(here.argmin())
@@ -58,7 +58,7 @@ def check_clearance(
     return wanted, np.min(have, axis=0)
 
 
-def _asked(robot: Robot, margin: ArrayLike) -> float:
+def _check_margin(robot: Robot, margin: ArrayLike) -> float:
     """The clearance asked for, of a robot that has pairs to keep apart."""
     wanted = checks.number("clearance", margin, unit="m", least=0.0)
     if not robot.collision_pairs:

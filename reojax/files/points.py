@@ -15,7 +15,7 @@ from reojax.motion.time_laws import Law
 from reojax.motion.trajectory import Trajectory, along
 from reojax.path import Path, polygon
 from reojax.planning.free_paths_result import FreePaths
-from reojax.planning.plan_file import SavedPlan, repeated
+from reojax.planning.plan_file import SavedPlan, runs_of
 from reojax.planning.result import Plan
 
 LARGEST = 1_000_000
@@ -84,4 +84,4 @@ def _path(movement: Any) -> Path:
         raise ValueError(f"these are {len(movement.error)} plans; choose one, as by `polygon(plans.waypoints[k])`.")
     if isinstance(movement, Plan):
         return polygon(movement.waypoints)
-    return repeated(movement.waypoints, int(movement.repeats))
+    return runs_of(movement.waypoints, int(movement.repeats))

@@ -253,11 +253,11 @@ def _accelerations(
     # from joint to joint, and on to the centre of mass
     arm = pose.origin[1:] - pose.origin[parent]
     lever = jnp.einsum("iab,ib->ia", pose.rotation, robot.com)
-    centre = moved @ _swung(w[parent], w_dot[parent], arm) + _swung(w, w_dot, lever)
+    centre = moved @ _lever_acceleration(w[parent], w_dot[parent], arm) + _lever_acceleration(w, w_dot, lever)
     share = robot.mass / robot.mass.sum()
     return w, w_dot, centre - (share @ centre)[None]
 
 
-def _swung(rate: Array, rate_dot: Array, arm: Array) -> Array:
+def _lever_acceleration(rate: Array, rate_dot: Array, arm: Array) -> Array:
     """Acceleration of the end of `arm`, relative to its start, on a body that turns; all (m, 3)."""
     return jnp.cross(rate_dot, arm) + jnp.cross(rate, jnp.cross(rate, arm))

@@ -52,7 +52,7 @@ def linearise(function: Callable[[Array], Conditions], x: Array) -> Linearised:
 
 
 def restore_feasibility(
-    linearised: Callable[[Any, Any], Linearised],
+    linearisation: Callable[[Any, Any], Linearised],
     build: Callable[[Any], Trajectory],
     miss: Callable[[Trajectory], Any],
     start: Float[np.ndarray, " n"],
@@ -61,7 +61,7 @@ def restore_feasibility(
     """Return the unknowns of a motion, changed little, for the net rotation wanted and all joints within limits.
 
     Args:
-        linearised: conditions of the motion and their derivatives, by the unknowns and shares of the pieces (2, p, j).
+        linearisation: conditions of the motion and their derivatives, by the unknowns and shares of the pieces (2, p, j).
         build: makes the motion.
         miss: of a motion, exactly what the equality gives roughly.
         start: the unknowns.
@@ -72,7 +72,7 @@ def restore_feasibility(
     for _ in range(_STEPS):
         # conditions where the joints are farthest; the rotation exactly
         trajectory = build(x)
-        now = Linearised(*(np.array(part) for part in linearised(x, farthest(trajectory))))
+        now = Linearised(*(np.array(part) for part in linearisation(x, farthest(trajectory))))
         if now.equality.size:
             now = now._replace(equality=np.asarray(miss(trajectory)))
         now = now._replace(inequality=now.inequality + _CLEAR)

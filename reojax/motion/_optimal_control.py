@@ -137,9 +137,9 @@ def _solve(
     )  # fmt: skip
     best = np.asarray(found.value[found.best], float)
     if not task.parametrisation.keeps_rotation or beyond(task.robot, programs.build(best)) > _ROUNDING:
-        linearised = lambda x, share: conditions.linearised(x, share, wanted, numbers)
+        linearisation = lambda x, share: conditions.linearisation(x, share, wanted, numbers)
         limits = box.lower, box.upper, box.scale
-        best = restore_feasibility(linearised, programs.build, programs.rotation_left, best, limits)
+        best = restore_feasibility(linearisation, programs.build, programs.rotation_left, best, limits)
     trajectory = programs.build(best)
     return _Answer(found, best, stretch(trajectory, minimum_stretch(task.robot, trajectory, task.motors)))
 

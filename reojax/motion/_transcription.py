@@ -122,7 +122,7 @@ class Transcription:
         return self.parametrisation.build(x, numbers.motion)
 
     @partial(jax.jit, static_argnums=0)
-    def linearised(self, x: Array, share: Array, wanted: Array, numbers: Numbers) -> Linearised:
+    def linearisation(self, x: Array, share: Array, wanted: Array, numbers: Numbers) -> Linearised:
         """The conditions where the joints are farthest, without motors, and their derivatives.
 
         Args:

@@ -170,7 +170,7 @@ def _program(
     kind: Callable[[tuple[Part, ...], Array, Given], Any],
 ) -> _Program:
     """Trace a program. Only the last few are kept, as they hold on to a user's functions."""
-    parts = _traced_once(functions)
+    parts = _parts_of(functions)
     made = partial(kind, parts)
     many = jax.vmap(made, (0, Given(0, None))) if block > 1 else partial(_alone, made)
     shared = types.shared.placeholders()
@@ -183,7 +183,7 @@ def _program(
 
 
 @lru_cache(maxsize=64)
-def _traced_once(functions: Functions) -> tuple[Part, ...]:
+def _parts_of(functions: Functions) -> tuple[Part, ...]:
     """The parts such that sizes, values and derivatives, of any block, trace each function once for all."""
     return tuple(jax.jit(part, inline=True) for part in functions.parts())
 

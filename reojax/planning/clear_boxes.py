@@ -31,7 +31,7 @@ def clear_boxes(layout: Layout, box: AmplitudeBox, clear: Clear) -> AmplitudeBox
         axes = [_nodes(*ends, _NODES[box.low.shape[1]]) for ends in zip(box.low[k], box.high[k], strict=True)]
         grid = np.stack(np.meshgrid(*axes, indexing="ij")).reshape(len(axes), -1)
         last = last_twist(letter, np.zeros(grid.shape[1], int), grid)
-        kept = clear.kept(loop_corners(layout, grid[0], grid[1], last)).reshape([len(axis) for axis in axes])
+        kept = clear.keeps(loop_corners(layout, grid[0], grid[1], last)).reshape([len(axis) for axis in axes])
         for first, end in _cover(kept, [int(np.flatnonzero(axis == 0)[0]) for axis in axes]):
             letters += letter
             low.append([axis[i] for axis, i in zip(axes, first, strict=True)])

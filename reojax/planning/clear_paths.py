@@ -38,7 +38,7 @@ class Clear(NamedTuple):
             bound[short] = np.maximum(bound[short], self._enough(paths[short]))
         return bound
 
-    def kept(self, paths: Float[np.ndarray, "m v j"]) -> np.ndarray:
+    def keeps(self, paths: Float[np.ndarray, "m v j"]) -> np.ndarray:
         """Which paths (m,) are proven to keep the margin; quicker than `proven`."""
         return self._enough(paths) >= self.margin
 
@@ -50,7 +50,7 @@ class Clear(NamedTuple):
         """Clearance to ask of each pair at samples [m], up to `spare` more than the margin."""
         return with_spare(self.margin, spare, self.have)
 
-    def sampled(self, paths: Float[np.ndarray, "m v j"]) -> np.ndarray:
+    def keeps_at_samples(self, paths: Float[np.ndarray, "m v j"]) -> np.ndarray:
         """Which paths (m,) keep the margin at a few samples of each edge: much quicker, and no proof."""
         calls = [np.arange(i, i + _SAMPLED) for i in range(0, len(paths), _SAMPLED)]
         with jax.enable_x64(True):

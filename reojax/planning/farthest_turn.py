@@ -92,12 +92,12 @@ def farthest_turn(
         if clearance is not None:
             clear = Clear(robot, *check_clearance(robot, clearance, {"the posture at the start": freedom.start}))
         polygons = polygons_of(robot, freedom, count)
-        table = table_of(polygons, freedom, key_of(robot), seed)
+        table = table_of(polygons, freedom, key_of(robot), seed, clear)
         reach = reach_of(robot, freedom, polygons, table.turns)
         unit = direction / size
         if not _possible(reach, unit):
             return _stay(polygons, freedom, clear, f"unreachable: {reach.explain()}")
-        table = _clear_first(table, polygons, freedom, clear, unit, starts)
+        table = _clear_first(table, unit, starts)
         search = Search(polygons, table, freedom, starts, max_steps, tolerance, clear)
         with search.bar(progress):
             x = _farthest(search, unit)
@@ -115,15 +115,12 @@ def _possible(reach: Reach, axis: np.ndarray) -> bool:
     return reach.rank == 3 or (reach.rank == 1 and abs(abs(float(reach.axes[0] @ axis)) - 1) < 1e-9)
 
 
-def _clear_first(
-    table: PolygonTable, polygons: Polygons, freedom: Freedom, clear: Clear | None, axis: np.ndarray, starts: int
-) -> PolygonTable:
+def _clear_first(table: PolygonTable, axis: np.ndarray, starts: int) -> PolygonTable:
     """The polygons to start from where a clearance is asked for: a search out of deep contact gets nowhere."""
-    if clear is None:
+    if table.clear is None:
         return table
     rows = table.farthest_rows(axis, max(_LOOKED_AT, 2 * starts))
-    kept = clear.sampled(polygons.paths(table.x[rows], freedom))
-    rows = rows[np.argsort(~kept, kind="stable")][: 2 * starts]
+    rows = rows[np.argsort(~table.clear[rows], kind="stable")][: 2 * starts]
     return PolygonTable(table.x[rows], table.turns[:, rows], table.lengths[rows])
 
 
@@ -140,7 +137,7 @@ def _farthest(search: Search, axis: np.ndarray) -> np.ndarray | None:
         wanted = _rotations(axis, share * turns[able])
         moved = search.onto(x[able], wanted)
         paths = search.polygons.paths(moved, search.freedom)
-        kept = np.full(len(able), True) if search.clear is None else search.clear.kept(paths)
+        kept = np.full(len(able), True) if search.clear is None else search.clear.keeps(paths)
         on = kept & (apart(search.polygons.rotations(paths), wanted) <= search.tolerance)
         if on.any():
             return moved[[np.flatnonzero(on)[0]]]

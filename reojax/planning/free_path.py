@@ -25,7 +25,7 @@ from reojax.planning.free_search import Search, apart
 from reojax.planning.freedom import Freedom, freedom_of
 from reojax.planning.polygon_table import table_of
 from reojax.planning.reach import reach_of
-from reojax.planning.repeats import MOST_REPEATS, least_repeats, repeated
+from reojax.planning.repeats import MOST_REPEATS, least_repeats, polygons_by_runs
 from reojax.planning.words import box_of
 from reojax.robot import Robot
 
@@ -212,7 +212,7 @@ def _solve(
                 x[moving], runs[moving] = least_repeats(search, possible[moving])
             else:
                 runs[moving] = repeats
-                x[moving] = repeated(search, possible[moving], runs[moving])
+                x[moving] = polygons_by_runs(search, possible[moving], runs[moving])
             _clear_again(search, x, runs, possible, moving)
     paths = polygons.paths(x, freedom)
     paths[still] = np.where(np.arange(corners + 2)[:, None] <= corners, freedom.start, freedom.end)
@@ -250,11 +250,11 @@ def _clear_again(search: Search, x: np.ndarray, runs: np.ndarray, targets: np.nd
         return
     search.rounds = 1  # from where they are
     for _ in range(_AGAIN):
-        near = moving[~search.clear.kept(search.polygons.paths(x[moving], search.freedom))]
+        near = moving[~search.clear.keeps(search.polygons.paths(x[moving], search.freedom))]
         if not len(near):
             return
         search.spare = 2 * search.spare + 1e-4
-        x[near] = repeated(search, targets[near], runs[near], x[near][:, None])
+        x[near] = polygons_by_runs(search, targets[near], runs[near], x[near][:, None])
 
 
 def _fold_rotation(polygons: Any, before: np.ndarray, corners: int) -> np.ndarray:

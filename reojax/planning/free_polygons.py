@@ -71,7 +71,7 @@ class Polygons(NamedTuple):
     """Rotation vector (3,) from the target, by `COARSE` steps."""
     too_near: Callable[[Array, Aim], Array]
     """What is missing to the clearance, for an inequality."""
-    turned: Callable[..., Array]
+    net_rotations: Callable[..., Array]
     """Net rotations (m, 3, 3) of whole paths (m, v, j), steps per edge."""
 
     def paths(self, x: np.ndarray, freedom: Freedom) -> np.ndarray:
@@ -85,7 +85,9 @@ class Polygons(NamedTuple):
         """Net rotations (m, 3, 3) of whole paths (m, v, j)."""
         size = _CALL_LONG if paths.shape[2] > ALONE else _CALL
         calls = [np.arange(i, i + size) for i in range(0, len(paths), size)]
-        found = [np.asarray(self.turned(paths[np.minimum(call, len(paths) - 1)], steps), float) for call in calls]
+        found = [
+            np.asarray(self.net_rotations(paths[np.minimum(call, len(paths) - 1)], steps), float) for call in calls
+        ]
         return np.concatenate(found)[: len(paths)] if found else np.zeros((0, 3, 3))
 
 
@@ -126,7 +128,7 @@ def _polygons_of(robot: Robot, joints: tuple[int, ...], moves: np.ndarray, corne
     def too_near(x: Array, aim: Aim) -> Array:
         return clearance_shortfall(robot, points(x, aim), 0.0, samples=_SAMPLES, more=aim.margin)
 
-    def turned(paths: Array, steps: int) -> Array:
+    def net_rotations(paths: Array, steps: int) -> Array:
         return jax.vmap(lambda path: net_rotation(robot, Path(path), steps=steps))(paths)
 
-    return Polygons(corners, moves, travel, miss, too_near, jax.jit(turned, static_argnums=1))
+    return Polygons(corners, moves, travel, miss, too_near, jax.jit(net_rotations, static_argnums=1))

@@ -185,7 +185,7 @@ class Search:
             x, miss, travel = self._solve(x, aim, exact[waiting].min(), _ROUND, most_steps=steps)
             tried[waiting, first : first + self.starts] = x.reshape(shape)
             if self.clear is not None:  # what touches between the samples is no answer
-                miss = np.where(self.clear.kept(self.polygons.paths(x, self.freedom)), miss, 10.0 + miss)
+                miss = np.where(self.clear.keeps(self.polygons.paths(x, self.freedom)), miss, 10.0 + miss)
             value = _worth(miss, travel, close * exact[owner])
             worth[waiting, first : first + self.starts] = value.reshape(shape[:2])
         return np.take_along_axis(tried, worth.argsort(1)[:, :_FINALISTS, None], 1)
@@ -217,7 +217,7 @@ class Search:
                 old[going[better]] = change[better]
         paths = polygons.paths(x, self.freedom)
         if self.clear is not None:
-            error = np.where(self.clear.kept(paths), error, 10.0 + error)  # worse than any miss
+            error = np.where(self.clear.keeps(paths), error, 10.0 + error)  # worse than any miss
         worth = _worth(error, np.abs(np.diff(paths, axis=1)).sum((1, 2)), tolerance).reshape(shape)
         return np.take_along_axis(x.reshape(*shape, -1), worth.argmin(1)[:, None, None], 1)[:, 0]
 

@@ -71,10 +71,10 @@ class SavedPlan(NamedTuple):
     @property
     def path(self) -> Path:
         """The joint path of all runs."""
-        return repeated(self.waypoints, self.repeats)
+        return runs_of(self.waypoints, self.repeats)
 
 
-def repeated(waypoints: Float[np.ndarray, "v j"], repeats: int) -> Path:
+def runs_of(waypoints: Float[np.ndarray, "v j"], repeats: int) -> Path:
     """The joint path of `repeats` runs of a closed polygon.
 
     Raises:

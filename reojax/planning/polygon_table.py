@@ -75,7 +75,7 @@ def table_of(polygons: Polygons, freedom: Freedom, key: object, seed: int, clear
     table = _tables.get(whole, lambda: _table(polygons, freedom, seed))
     if clear is None:
         return table
-    rows = _clear.get((*whole, clear.margin), lambda: clear.sampled(polygons.paths(table.x, freedom)))
+    rows = _clear.get((*whole, clear.margin), lambda: clear.keeps_at_samples(polygons.paths(table.x, freedom)))
     return table._replace(clear=rows)
 
 

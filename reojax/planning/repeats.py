@@ -16,7 +16,9 @@ _TRIES = 12
 """Numbers of runs tried, each a twentieth more than the one before, or one."""
 
 
-def repeated(search: Search, targets: np.ndarray, runs: np.ndarray, hints: np.ndarray | None = None) -> np.ndarray:
+def polygons_by_runs(
+    search: Search, targets: np.ndarray, runs: np.ndarray, hints: np.ndarray | None = None
+) -> np.ndarray:
     """Polygons (m, n) whose `runs`-th powers are the targets (m, 3, 3), or as near as can be found."""
     x, error = search.table.x[:1].repeat(len(targets), 0), np.full(len(targets), np.inf)
     # of each root in turn, for what the ones before have not reached
@@ -52,7 +54,7 @@ def least_repeats(search: Search, targets: np.ndarray) -> tuple[np.ndarray, np.n
         waiting = np.flatnonzero(error > search.tolerance)
         if not len(waiting):
             break
-        found = repeated(search, targets[waiting], runs[waiting], hints[waiting])
+        found = polygons_by_runs(search, targets[waiting], runs[waiting], hints[waiting])
         off = _error(search, found, targets[waiting], runs[waiting])
         better = waiting[off < error[waiting]]
         x[better], best[better], error[better] = (part[off < error[waiting]] for part in (found, runs[waiting], off))

@@ -49,13 +49,13 @@ def check_arguments(function: Callable[Arguments, Answer]) -> Callable[Arguments
     rules = {name: _words(parameter.annotation) for name, parameter in signature.parameters.items()}
 
     @wraps(function)
-    def drawn(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
+    def draw(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
         bound = signature.bind(*args, **kwargs)
         for entry, value in bound.arguments.items():
             bound.arguments[entry] = _check(entry, value, rules[entry])
         return function(*bound.args, **bound.kwargs)
 
-    return drawn
+    return draw
 
 
 def _words(annotation: Any) -> list[str]:

@@ -129,11 +129,11 @@ def draw_result(
     axes.tick_params(colors=INK, color=GREY)
     if len(drawn) == 1:
         marker = "o" if values.size <= 40 else ""
-        axes.plot(_shown_axis(sweep, drawn[0]), values, color="#0072b2", linewidth=1.8, marker=marker, markersize=4)
+        axes.plot(_display_axis(sweep, drawn[0]), values, color="#0072b2", linewidth=1.8, marker=marker, markersize=4)
         axes.grid(color=PALE, linewidth=0.6)
         axes.spines[["top", "right"]].set_visible(False)
         return axes
-    x, y = (_shown_axis(sweep, dimension) for dimension in drawn)
+    x, y = (_display_axis(sweep, dimension) for dimension in drawn)
     axes.set_ylabel(_label(sweep, drawn[1]), color=INK)
     if values.count() == 0 or np.ptp(values.compressed()) == 0:
         text = f"{values.compressed()[0]:g} everywhere" if values.count() else "no finite result"
@@ -159,7 +159,7 @@ def _choose(sweep: "Sweep", results: Sequence[str] | None, most: int) -> list[st
     return names
 
 
-def _shown_axis(sweep: "Sweep", dimension: str) -> np.ndarray:
+def _display_axis(sweep: "Sweep", dimension: str) -> np.ndarray:
     if dimension not in sweep.axes:  # a list of designs
         return np.arange(sweep.shape[0])
     return np.asarray(sweep.axes[dimension], float) * display_unit(sweep.units.get(dimension, ""))[1]
@@ -173,5 +173,5 @@ def _label(sweep: "Sweep", name: str) -> str:
 
 def _at(sweep: "Sweep", dimension: str, index: slice | int) -> str:
     unit, _ = display_unit(sweep.units.get(dimension, ""))
-    value = _shown_axis(sweep, dimension)[index]
+    value = _display_axis(sweep, dimension)[index]
     return f"{dimension.replace('_', ' ')} {value:.6g} {unit.replace('^2', '²')}".rstrip()

@@ -18,12 +18,12 @@ def rows(clip: Clip, target: Float[np.ndarray, "3 3"] | None) -> dict[str, str]:
     end = clip.rotation[0].T @ clip.rotation[-1]
     vector = np.rad2deg(np.asarray(so3.log(end), float))
     told = {
-        "net rotation vector": f"({', '.join(_fixed(x, 2) for x in vector)})°",
-        "net rotation angle": f"{_fixed(float(np.linalg.norm(vector)), 3)}°",
+        "net rotation vector": f"({', '.join(_decimals(x, 2) for x in vector)})°",
+        "net rotation angle": f"{_decimals(float(np.linalg.norm(vector)), 3)}°",
     }
     if clip.rotation[:, 2, 2].min() > -0.999:  # where z is never turned upside down, the roll can be counted on
         roll = tilt_and_roll(clip.rotation)[:, 2]
-        told["roll about z, counted on"] = f"{_fixed(np.rad2deg(roll[-1] - roll[0]), 2)}°"
+        told["roll about z, counted on"] = f"{_decimals(np.rad2deg(roll[-1] - roll[0]), 2)}°"
     if target is not None:
         told["left to the target"] = f"{np.rad2deg(angle_to(clip.rotation[-1:], target)[0]):.3g}°"
     told["joint travel, all joints"] = f"{np.rad2deg(clip.travel):.0f}°"
@@ -48,7 +48,7 @@ def nearest(clip: Clip) -> str:
         return ""
     place = clip.nearest.place
     gap = 1e3 * place.found
-    how = f"{_fixed(-gap, 2)} mm deep in contact" if gap < 0 else f"{np.floor(1e5 * place.distance) / 100:.2f} mm"
+    how = f"{_decimals(-gap, 2)} mm deep in contact" if gap < 0 else f"{np.floor(1e5 * place.distance) / 100:.2f} mm"
     return f"{how}, {place.name}, at {clip.nearest.clock:.4g} {'s' if clip.timed else 'edges'}"
 
 
@@ -60,7 +60,7 @@ def _of_motors(clip: Clip) -> dict[str, str]:
         "largest joint torque": f"{np.abs(clip.motion.torque).max():.3g} N m",
     }
     if clip.motion.margin is not None:
-        told["least motor margin"] = f"{_fixed(100 * float(np.min(clip.motion.margin)), 0)} % of the supply"
+        told["least motor margin"] = f"{_decimals(100 * float(np.min(clip.motion.margin)), 0)} % of the supply"
     return told
 
 
@@ -80,6 +80,6 @@ def _small(value: Array) -> str:
     return f"{float(value):.0e}" if value > 1e-16 else "below 1e-16"
 
 
-def _fixed(value: float, digits: int) -> str:
+def _decimals(value: float, digits: int) -> str:
     text = f"{value:.{digits}f}"
     return f"{0:.{digits}f}" if float(text) == 0 else text.replace("-", _MINUS)

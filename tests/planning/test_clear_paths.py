@@ -90,5 +90,5 @@ def test_boxes_hold_only_clear_loops():
         x = rng.uniform(boxes.low[letter], boxes.high[letter]).T
         loops = loop_corners(layout, *x, last_twist(boxes.letters, letter, x))
         assert set(boxes.letters) == {"A", "B"}
-        assert clear.kept(loops).mean() > 0.97
+        assert clear.keeps(loops).mean() > 0.97
         assert np.isclose(boxes.high, whole.high[0]).any(0).all()
