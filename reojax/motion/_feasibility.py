@@ -61,7 +61,7 @@ def restore_feasibility(
     """Return the unknowns of a motion, changed little, for the net rotation wanted and all joints within limits.
 
     Args:
-        linearisation: conditions of the motion and their derivatives, by the unknowns and shares of the pieces (2, p, j).
+        linearisation: conditions of the motion with derivatives, by the unknowns and shares of the pieces (2, p, j).
         build: makes the motion.
         miss: of a motion, exactly what the equality gives roughly.
         start: the unknowns.
