@@ -80,6 +80,14 @@ def joints_simulated(robot: Robot, capture: Capture) -> Sampled:
 
     Gaps of a joint are filled by monotone cubics (PCHIP) between the frames in which it was seen, and held at the ends.
 
+    Args:
+        robot: the robot.
+        capture: what was measured, `m` frames with joint angles.
+
+    Returns:
+        Times [s], angles (m, j) [rad] without gaps, and rotations (m, 3, 3) of the base, base frame to inertial, the
+        identity at first.
+
     Raises:
         ValueError: if the capture has no joint angles, other ones than the robot's, a joint was never seen, or goes
             more than 32 rad between two frames.

@@ -44,6 +44,10 @@ def authority(*, after: float = 0.5) -> Measure:
 def authority_above(least: float, *, after: float = 0.5) -> Measure:
     """Whether `authority(after=after)` is at least `least`, for an inequality: what is missing, as a share of it.
 
+    Args:
+        least: least authority that is wanted, above 0 [rad^2].
+        after: share of the path that has been done, as for `authority`.
+
     Raises:
         ValueError: if `least` is not positive, or the share out of its range.
     """

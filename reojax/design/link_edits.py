@@ -88,6 +88,11 @@ def with_joint_inertia(robot: Robot, joint: int | str, inertia: ArrayLike) -> Ro
 
     All its mass is moved straight towards or away from the axis by one factor, as in `robots.with_end_inertia`.
 
+    Args:
+        robot: the robot.
+        joint: number or name of the joint.
+        inertia: wanted inertia about the joint's axis [kg m^2]; may be traced.
+
     Raises:
         ValueError: if there is no such joint, or `inertia` is not one positive number.
     """

@@ -28,8 +28,6 @@ from reojax.path import Path
 from reojax.robot import Robot
 
 Build = Callable[[dict[str, Array]], tuple[Robot, Path]]
-
-
 Vector = Callable[[Array], Array]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from reojax._internal.arrays import Array
 from reojax.collision.clearance import without_pairs
 from reojax.collision.constraint import clearance_shortfall
+from reojax.optimisation.functions import BLOCK
 from reojax.optimisation.optimise import Solution, choose_best
 from reojax.optimisation.status import Status
 
@@ -72,9 +73,10 @@ def solve_proven(
     every = np.arange(len(x))
 
     def tightened(x: np.ndarray, rows: np.ndarray, level: int) -> Solution:
-        """As many rows at any level, for one program serves them all; those that fill them up end at once."""
-        fill = np.minimum(every, len(rows) - 1)
-        found = run(x[fill], rows[fill], np.where(every < len(rows), share_of(level), np.nan))
+        """A whole block of rows at least, for one program serves all levels; those that fill it up end at once."""
+        block = every[: max(len(rows), BLOCK)]
+        fill = np.minimum(block, len(rows) - 1)
+        found = run(x[fill], rows[fill], np.where(block < len(rows), share_of(level), np.nan))
         fields = {name: value[: len(rows)] for name, value in found._asdict().items() if name != "best"}
         return Solution(**fields, best=0)
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from reojax.optimisation.optimise import Solution, choose_best
-from reojax.optimisation.status import describe
+from reojax.optimisation.status import describe, residual_by_another_name
 
 
 class Solutions(NamedTuple):
@@ -24,15 +24,10 @@ class Solutions(NamedTuple):
     best: Int[np.ndarray, " k"]
     """Which start is best for each problem: of least cost among the converged, else of least residual."""
 
-    @property
-    def violation(self) -> Float[np.ndarray, "k s"]:
-        """Another name for `residual`, the one that all solvers' results have."""
-        return self.residual
-
-    @property
-    def error(self) -> Float[np.ndarray, "k s"]:
-        """Another name for `residual`."""
-        return self.residual
+    violation = residual_by_another_name
+    """Largest violation of a constraint, under the names that all solvers' results have."""
+    error = residual_by_another_name
+    """The same."""
 
     @property
     def message(self) -> list[list[str]]:

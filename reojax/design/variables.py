@@ -47,6 +47,9 @@ class Space:
     def __init__(self, variables: Sequence[Variable]) -> None:
         """Check the variables.
 
+        Args:
+            variables: one or more, in the order that they have in the vector.
+
         Raises:
             ValueError: for names that repeat, an unknown unit, bounds the wrong way round, or a catalogue outside.
         """

@@ -159,5 +159,5 @@ def _solve_apart(
         if answer.clearance >= apart.margin:
             break
         spare = 2 * spare + apart.margin - float(answer.clearance)
-        answer = attempt(answer.unknowns[None])
+        answer = attempt(np.tile(answer.unknowns, (len(starts), 1)))  # as many as before: nothing more is compiled
     return answer

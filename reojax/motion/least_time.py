@@ -151,9 +151,10 @@ def minimum_time(
 def minimum_stretch(
     robot: Robot, trajectory: Trajectory, motors: Motor | Sequence[Motor], *, samples: int = DEFAULT_SAMPLES
 ) -> Float[Array, ""]:
-    """Least factor by which a trajectory's time must be stretched for its motors, at zero momentum.
+    """Least factor, a scalar without a unit, by which a trajectory's time must be stretched for its motors.
 
-    Below 1 for one that can be run faster. Arguments and errors as for `minimum_time`.
+    At zero momentum. Below 1 for one that can be run faster; 0 for one that stays put. Arguments and
+    errors as for `minimum_time`.
     """
     motors = _able(motors, robot)
     _check_fit(robot, trajectory)

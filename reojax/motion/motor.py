@@ -116,7 +116,11 @@ def no_load_speed(motor: Motor) -> float | Array:
 
 
 def with_motors(robot: Robot, motors: Motor | Sequence[Motor]) -> Robot:
-    """Return the robot with the rotor inertias and gear ratios of `motors`; for its mechanics.
+    """Return the robot with the rotor inertias [kg m^2] and gear ratios of `motors`; for its mechanics.
+
+    Args:
+        robot: the robot, of j joints.
+        motors: motors of the joints, one for all or one for each.
 
     Raises:
         ValueError: if the motors do not fit the robot, or hold a number that no motor has.

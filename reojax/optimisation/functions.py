@@ -20,7 +20,7 @@ from reojax._internal.arrays import Array
 from reojax._internal.checks import shorten
 
 Function = Callable[..., Any]
-_BLOCK, _VALUES_BLOCK = 8, 12
+BLOCK, _VALUES_BLOCK = 8, 12
 """Most starts differentiated in one call, and points evaluated: as many as a line search looks at."""
 
 
@@ -86,7 +86,7 @@ class Programs:
         """
         self._data, self._shared = jax.tree.map(np.asarray, data), jax.tree.map(jnp.asarray, shared)
         self._dtype = x.dtype
-        self._blocks = _VALUES_BLOCK, _power_of_two(min(len(x), _BLOCK))
+        self._blocks = _VALUES_BLOCK, _power_of_two(min(len(x), BLOCK))
         types = Given(_types(self._data, 1), _types(self._shared, 0))
         compiled = _compile(functions, x.dtype, x.shape[1], types, self._blocks)
         self._values, self._derivatives, self.equalities = compiled

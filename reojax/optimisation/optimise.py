@@ -18,7 +18,7 @@ from reojax.optimisation.arguments import check_starts, check_tolerances
 from reojax.optimisation.functions import Function, Functions, Given, Programs
 from reojax.optimisation.iterates import Iterates, ScaledProblem
 from reojax.optimisation.sqp import minimise
-from reojax.optimisation.status import Status, describe
+from reojax.optimisation.status import Status, describe, residual_by_another_name
 
 _LEAST_SINGLE = 1e-6
 """Smallest tolerance that single precision can meet, for constraints of about 1."""
@@ -46,15 +46,10 @@ class Solution(NamedTuple):
     status: Int[np.ndarray, " m"]
     """Why each start ended, a `reojax.optimisation.status.Status`; `message` says it in words."""
 
-    @property
-    def violation(self) -> Float[np.ndarray, " m"]:
-        """Another name for `residual`, the one that all solvers' results have."""
-        return self.residual
-
-    @property
-    def error(self) -> Float[np.ndarray, " m"]:
-        """Another name for `residual`."""
-        return self.residual
+    violation = residual_by_another_name
+    """Largest violation of a constraint, under the names that all solvers' results have."""
+    error = residual_by_another_name
+    """The same."""
 
     @property
     def message(self) -> list[str]:

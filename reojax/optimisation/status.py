@@ -54,6 +54,12 @@ def describe(status: Any) -> str | list[str]:
 
 
 @property
+def residual_by_another_name(result: Any) -> Any:
+    """Another name for `residual`, one that all solvers' results have: a property for classes that have it."""
+    return result.residual
+
+
+@property
 def converged_by_status(result: Any) -> Any:
     """Whether it converged: a property for classes of results that have a `status`."""
     return result.status == Status.CONVERGED

@@ -73,6 +73,9 @@ def bandwidth_figure(bandwidth: ArrayLike, lag: dict[str, np.ndarray], chosen: d
         bandwidth: (m,) the bandwidths that were tried [rad/s].
         lag: for each controller, (m,) RMS errors [rad].
         chosen: for each controller, the tuned bandwidth [rad/s].
+
+    Raises:
+        ValueError: if an array has another shape or a number that is not finite, or a controller has no bandwidth.
     """
     along = checks.numbers("bandwidth", bandwidth, (-1,))
     for name, values in lag.items():

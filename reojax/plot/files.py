@@ -25,6 +25,10 @@ def check_picture(path: str | os.PathLike[str]) -> Path:
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     """Write a figure to `path`, whole or not at all, in the format that the ending says.
 
+    Args:
+        figure: the figure.
+        path: where to, with an ending in `FORMATS`.
+
     Raises:
         ValueError: for an ending that is not in `FORMATS`, or a path that cannot be written.
     """

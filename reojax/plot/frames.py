@@ -34,6 +34,11 @@ class Frames(NamedTuple):
 def frames_along(robot: Robot, path: Path, *, per_edge: int = 1) -> Frames:
     """Poses of a robot along a path at zero momentum: at every corner, and `per_edge - 1` between two corners.
 
+    Args:
+        robot: the robot.
+        path: the path in shape space.
+        per_edge: poses of each edge.
+
     Raises:
         ValueError: if the path does not fit the robot, or `per_edge` is not a positive integer.
     """
