@@ -110,7 +110,7 @@ def minimum_time(
     """Shortest duration of each edge with every motor within its torque-speed curve at every instant.
 
     Exact at the samples, and differentiable with respect to robot, path, motors and law. Each edge starts and ends at
-    rest, so that edges do not depend on one another.
+    rest, so that edges do not depend on one another. One that stays put takes no time: of a path that does, 0 s.
 
     Args:
         robot: the robot; its rotor inertias and gear ratios hold.

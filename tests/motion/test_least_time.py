@@ -102,6 +102,17 @@ def test_an_edge_that_stays_put_takes_no_time():
     assert np.isfinite(reojax.simulate(PROTOTYPE, path, durations=durations, motors=RE_MAX_17).torque).all()
 
 
+def test_a_path_that_stays_put_takes_no_time():
+    """Nothing is asked of the motors, with friction or without: an answer, where `overlap` has nothing to make fast."""
+    path = reojax.polygon(np.zeros((5, 3)))
+    for motors in (RE_MAX_17, RE_MAX_17._replace(friction=1e-4)):
+        still = minimum_time(PROTOTYPE, path, motors, samples=128)
+        assert still.converged
+        assert still.duration == 0
+        np.testing.assert_array_equal(still.needs, np.zeros((4, 3)))
+    assert reojax.simulate(PROTOTYPE, path, durations=still.durations, motors=RE_MAX_17).time[-1] == 0
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
