@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -23,21 +23,12 @@ from reojax.design.solutions import Solutions
 from reojax.design.variables import Space, Variable, neighbours
 from reojax.mechanics.holonomy import DEFAULT_STEPS
 from reojax.optimisation.functions import Function, Functions
-from reojax.optimisation.optimise import Solution, choose_best, optimise
+from reojax.optimisation.optimise import Limits, Solution, choose_best, optimise
 from reojax.path import Path
 from reojax.robot import Robot
 
 Build = Callable[[dict[str, Array]], tuple[Robot, Path]]
 Vector = Callable[[Array], Array]
-
-
-class _Limits(NamedTuple):
-    """What `optimise` is asked for."""
-
-    tolerance: float
-    slope_tolerance: float
-    max_steps: int
-    progress: bool | str
 
 
 class Problem:
@@ -189,7 +180,7 @@ class Problem:
         Raises:
             ValueError: for an unknown name or a value outside of its bounds; and as `optimise`.
         """
-        limits = _Limits(tolerance, slope_tolerance, max_steps, progress)
+        limits = Limits(tolerance, slope_tolerance, max_steps, progress)
         x, held = self._starts(starts, seed), dict(hold or {})
         answer = self._solve_held(x, {name: np.asarray(value)[None] for name, value in held.items()}, limits)
         catalogues = {name: entries for name, entries in self.space.catalogues().items() if name not in held}
@@ -243,7 +234,7 @@ class Problem:
             raise ValueError(f"`holds` has {counts or 'nothing'}; every variable needs one value for each problem.")
         x, many = self._starts(starts, seed), next(iter(counts.values()))
         each = {name: np.repeat(np.asarray(value, float), len(x), axis=0) for name, value in holds.items()}
-        limits = _Limits(tolerance, slope_tolerance, max_steps, progress)
+        limits = Limits(tolerance, slope_tolerance, max_steps, progress)
         found = self._solve_held(np.tile(x, (many, 1)), each, limits)
         fields = {
             name: value.reshape(many, len(x), *value.shape[1:])
@@ -262,7 +253,7 @@ class Problem:
             raise ValueError(f"`starts` has shape {x.shape}; it must be (m, {self.space.lower.size}).")
         return x
 
-    def _solve_held(self, x: np.ndarray, held: Mapping[str, np.ndarray], limits: _Limits) -> Solution:
+    def _solve_held(self, x: np.ndarray, held: Mapping[str, np.ndarray], limits: Limits) -> Solution:
         """Solve with variables held at values (1 or m, ...), free where they are NaN."""
         x, lower, upper = self.space.hold(x, held)
         size = np.where(self.space.upper > self.space.lower, self.space.upper - self.space.lower, 1.0)

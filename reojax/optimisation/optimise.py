@@ -14,7 +14,7 @@ from tqdm import tqdm
 from reojax._internal import checks
 from reojax._internal.precision import warn_user
 from reojax._internal.progress import label
-from reojax.optimisation.arguments import check_starts, check_tolerances
+from reojax.optimisation.arguments import Box, check_starts, check_tolerances
 from reojax.optimisation.functions import Function, Functions, Given, Programs
 from reojax.optimisation.iterates import Iterates, ScaledProblem
 from reojax.optimisation.sqp import minimise
@@ -22,6 +22,15 @@ from reojax.optimisation.status import Status, describe, residual_by_another_nam
 
 _LEAST_SINGLE = 1e-6
 """Smallest tolerance that single precision can meet, for constraints of about 1."""
+
+
+class Limits(NamedTuple):
+    """When a start ends, and what is shown meanwhile: arguments of `optimise`."""
+
+    tolerance: float
+    slope_tolerance: float
+    max_steps: int
+    progress: bool | str
 
 
 class Solution(NamedTuple):
@@ -110,8 +119,8 @@ def optimise(
     checks.function("cost", cost, *takes)
     both = _several("equality", equality, takes), _several("inequality", inequality, takes)
     functions = Functions(cost, *both, data is not None)
-    given = Given(data, None)
-    return _run(functions, starts, lower, upper, given, scale, tolerance, slope_tolerance, max_steps, progress)
+    limits = Limits(tolerance, slope_tolerance, max_steps, progress)
+    return _run(functions, starts, (lower, upper, scale), Given(data, None), limits)
 
 
 def optimise_together(
@@ -134,44 +143,36 @@ def optimise_together(
     compiled is kept for all functions that are equal: a frozen dataclass with a `__call__` will do.
     """
     functions = Functions(None, (), (), True, function)
-    given = Given(data, shared)
-    return _run(functions, starts, lower, upper, given, scale, tolerance, slope_tolerance, max_steps, progress)
+    limits = Limits(tolerance, slope_tolerance, max_steps, progress)
+    return _run(functions, starts, (lower, upper, scale), Given(data, shared), limits)
 
 
 def _run(
-    functions: Functions,
-    starts: ArrayLike,
-    lower: ArrayLike,
-    upper: ArrayLike,
-    given: Given,
-    scale: ArrayLike | None,
-    tolerance: float,
-    slope_tolerance: float,
-    max_steps: int,
-    progress: bool | str,
+    functions: Functions, starts: ArrayLike, bounds: tuple[Any, Any, Any], given: Given, limits: Limits
 ) -> Solution:
-    x, box = check_starts(starts, lower, upper, scale, given.data)
-    check_tolerances(tolerance=tolerance, slope_tolerance=slope_tolerance)
-    checks.whole("max_steps", max_steps)
-    if x.dtype == np.float32 and tolerance < _LEAST_SINGLE:
+    """Check starts, bounds (least, largest, scale) and limits; compile; run all starts to their ends."""
+    x, box = check_starts(starts, *bounds, given.data)
+    check_tolerances(tolerance=limits.tolerance, slope_tolerance=limits.slope_tolerance)
+    checks.whole("max_steps", limits.max_steps)
+    if x.dtype == np.float32 and limits.tolerance < _LEAST_SINGLE:
         warn_user(
-            f"`tolerance` is {tolerance:g}, which single precision, JAX's default, seldom meets: switch double "
+            f"`tolerance` is {limits.tolerance:g}, which single precision, JAX's default, seldom meets: switch double "
             'precision on by jax.config.update("jax_enable_x64", True) before anything is computed, or ask for 1e-5.'
         )
-    programs = Programs(functions, x, *given)
     problem = ScaledProblem(
-        programs=programs,
+        programs=Programs(functions, x, *given),
         lower=box.lower / box.scale,
         upper=box.upper / box.scale,
         scale=box.scale,
         precision=float(np.finfo(x.dtype).eps),
-        tolerance=float(tolerance),
-        slope_tolerance=float(slope_tolerance),
-        max_steps=int(max_steps),
+        tolerance=float(limits.tolerance),
+        slope_tolerance=float(limits.slope_tolerance),
+        max_steps=int(limits.max_steps),
     )
-    with tqdm(total=len(x), desc=label(progress), unit="start", file=sys.stderr, disable=not progress) as bar:
+    hidden = not limits.progress
+    with tqdm(total=len(x), desc=label(limits.progress), unit="start", file=sys.stderr, disable=hidden) as bar:
         ended = minimise(problem, x / box.scale, lambda count: bar.update(count - bar.n))
-    return _solution(ended, box.lower, box.upper, box.scale, x.dtype)
+    return _solution(ended, box, x.dtype)
 
 
 def choose_best(
@@ -191,14 +192,14 @@ def _several(
     return tuple(checks.function(f"{entry}[{i}]", function, *takes) for i, function in enumerate(listed))
 
 
-def _solution(ended: Iterates, lower: np.ndarray, upper: np.ndarray, scale: np.ndarray, dtype: np.dtype) -> Solution:
+def _solution(ended: Iterates, box: Box, dtype: np.dtype) -> Solution:
     begun = ended.status != Status.NOT_FINITE
     cost, residual, slope = (
         np.where(begun, a, np.inf).astype(dtype) for a in (ended.cost, ended.violation, ended.slope)
     )
     converged = ended.status == Status.CONVERGED
     return Solution(
-        value=np.clip((ended.x * scale).astype(dtype), lower, upper),
+        value=np.clip((ended.x * box.scale).astype(dtype), box.lower, box.upper),
         cost=cost,
         residual=residual,
         slope=slope,
