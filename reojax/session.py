@@ -25,6 +25,8 @@ LEAN_COMPILE = _LOOP_BY_LOOP
 """Options of a `jax.jit` whose program runs some milliseconds in all: a quarter less to compile, about as fast."""
 LEAST_COMPILE = _LOOP_BY_LOOP | {"xla_backend_optimization_level": 0}
 """Options of a `jax.jit` whose program runs once or twice: a quarter of the compile time, several times as slow."""
+SEARCH_COMPILE = {"xla_backend_optimization_level": 3}
+"""Options of a `jax.jit` that a search runs many hundred times: optimised in a process that compiles quickly, too."""
 
 _folders: set[Path] = set()
 """Folders that this process has kept programs in."""

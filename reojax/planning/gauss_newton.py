@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float
 from reojax._internal.arrays import Array
 from reojax.planning.residual import Miss, Word, chain, dual, miss, pull, step
 from reojax.planning.table import Table, read
-from reojax.session import LEAN_COMPILE
+from reojax.session import LEAN_COMPILE, SEARCH_COMPILE
 
 _SOLVED = 1e-14
 """Squared residual [rad^2] at which the search on the table stops; the true rotations take over."""
@@ -39,7 +39,7 @@ class Iterate(NamedTuple):
     """Whether more steps may bring it to the target."""
 
 
-@jax.jit
+@partial(jax.jit, compiler_options=SEARCH_COMPILE)
 def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Iterate:
     """Bring words to their targets by Levenberg-Marquardt steps, clipped to the box."""
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)

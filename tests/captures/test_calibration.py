@@ -71,6 +71,7 @@ def test_the_truth_lies_within_the_stated_uncertainty(synthetic):
     np.testing.assert_allclose(np.mean(noise), synthetic.JOINT_NOISE, rtol=0.1)
 
 
+@pytest.mark.slow
 def test_noise_of_the_joints_does_not_shift_the_clocks(synthetic):
     """3.1 ms at 300 Hz is 7 % of a frame from a frame, where noise is largest: least squares alone finds less."""
     real, latency, found = synthetic.truth(0.0031), 0.0031, []
@@ -124,6 +125,7 @@ def test_rotor_and_gear_cannot_be_told_apart(exact):
     assert fit.condition > 1e6
 
 
+@pytest.mark.slow
 def test_what_hardly_moves_is_hardly_determined():
     """A robot at rest, seen through noise."""
     rng = np.random.default_rng(0)
@@ -187,6 +189,7 @@ def test_captures_that_cannot_be_used(exact):
         calibrate_function(robot, few, PAIR)
 
 
+@pytest.mark.slow
 def test_a_capture_in_which_nothing_moves_tells_nothing():
     """Slopes of exactly 0, from which SciPy's steps are no numbers: the fit ends there, and says what is not known."""
     time = np.linspace(0, 1, 12)

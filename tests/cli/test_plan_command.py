@@ -22,6 +22,7 @@ def _no_cache(monkeypatch):
     monkeypatch.setenv("REOJAX_CACHE", "0")
 
 
+@pytest.mark.slow
 def test_the_files_replay(capsys, tmp_path):
     picture, table = tmp_path / "a.svg", tmp_path / "a.csv"
     command = ["plan", "--target", "rotvec 0 90 0", "--json", "--out", str(picture), "--csv", str(table)]
@@ -128,6 +129,7 @@ def test_words_need_a_layout_and_free_paths_have_options_of_their_own(capsys):
     assert "argument --repeats: it is for free paths, not for manoeuvres" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_small_loops_many_times_over():
     """A quarter turn about each axis with loops of at most 40 degrees: hundreds of loops, and the path replays."""
     robot, limit = robots.prototype(), float(np.deg2rad(40))

@@ -46,6 +46,7 @@ def run(capsys, reader, file):
     return status, out.out, out.err
 
 
+@pytest.mark.slow
 def test_show_tells_robot_path_target_and_evidence(capsys, plan):
     status, text, _ = run(capsys, "show", plan)
     assert status == 0
@@ -59,6 +60,7 @@ def test_show_tells_robot_path_target_and_evidence(capsys, plan):
     assert report["certificate"]["momentum"] < 1e-8
 
 
+@pytest.mark.slow
 def test_time_takes_the_rotors_and_gears_that_the_robot_has(capsys, plan):
     """Half the winding's resistance is faster; a plan of two runs has eight edges."""
     seconds = []
@@ -70,6 +72,7 @@ def test_time_takes_the_rotors_and_gears_that_the_robot_has(capsys, plan):
     assert 0 < seconds[1] < seconds[0]
 
 
+@pytest.mark.slow
 def test_simulate_export_and_view_run_all_runs(capsys, plan, tmp_path):
     assert main(["simulate", "--plan", plan, "--duration", "8", "--json"]) == 0
     turned = json.loads(capsys.readouterr().out)

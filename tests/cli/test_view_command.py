@@ -66,6 +66,7 @@ def test_bad_plans(changes, words, tmp_path, capsys):
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_page_beside_the_numbers(tmp_path, capsys):
     """`--html` writes what `simulate`, `plan` and `compare` computed."""
     names = [str(tmp_path / f"{k}.html") for k in "spc"]

@@ -41,6 +41,7 @@ def test_long_paths_share_conditions():
     assert rows(reojax.robots.planar(2), curve[:, :1]) == (0,)
 
 
+@pytest.mark.slow
 def test_design_keeps_its_margin_provably():
     """The most bend of manoeuvre A whose feet pass 20 mm apart: proven along the whole loop, and little is given away.
 

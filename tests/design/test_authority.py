@@ -19,6 +19,7 @@ def test_it_is_the_authority_of_the_gains():
         assert abs(late_authority(ROBOT, path, after) / gains.authority[sample] - 1) < 1e-2
 
 
+@pytest.mark.slow
 def test_its_derivative():
     path = reojax.manoeuvre_a(np.deg2rad(250), np.deg2rad(110))
     change = np.random.default_rng(0).normal(size=path.waypoints.shape)
@@ -30,6 +31,7 @@ def test_its_derivative():
     assert abs(slope - (value(1e-5) - value(-1e-5)) / 2e-5) < 1e-5 * abs(slope)
 
 
+@pytest.mark.slow
 def test_a_loop_can_be_made_to_have_it():
     """The least twist of A that has the late authority of 250/110, with the bend free: it twists no more."""
     variables = [design.Variable("twist", 1.0, 4.5, "rad"), design.Variable("bend", 0.5, 2.0, "rad")]

@@ -41,6 +41,7 @@ def changed(name: str, by: float):
     return ROBOT.replace(**{field: array})
 
 
+@pytest.mark.slow
 def test_table_agrees_with_differences_and_is_sorted():
     table = design.sensitivities(ROBOT, PATH)
     assert len(table.name) == len(set(table.name)) == 3 + 9 + 18 + 4 + 6 + 2 + 2

@@ -61,6 +61,7 @@ def test_a_replay_by_pinocchio_is_part_of_it():
     assert proof.prove(ROBOT, PATH, 1, TURNED, 0.005)["pinocchio_rad"] < 1e-8
 
 
+@pytest.mark.slow
 def test_no_loop_turns_further_than_the_bound_allows():
     """Random loops of three and four rods in the plane and of the prototype, and the best square of small size."""
     rng = np.random.default_rng(0)

@@ -77,6 +77,7 @@ def test_a_clearance_has_a_unit(text, metres):
     assert length(text) == pytest.approx(metres)
 
 
+@pytest.mark.slow
 def test_the_command_answers_for_a_robot_of_a_file(tmp_path):
     """Rods in a plane, from a file: all that it says holds, and gradients leave no design worse than the robot is."""
     file = tmp_path / "rods.json"

@@ -11,6 +11,7 @@ TRUTH = RNG.normal(size=(2, LINKS))
 START = np.tile(np.eye(3), (2, 1, 1))
 
 
+@pytest.mark.slow
 def test_slopes_are_those_of_differences():
     found = turns(TRUTH, WORDS)
     for k in range(LINKS):

@@ -141,6 +141,7 @@ push_amplitudes = jax.jit(lambda x, weight, dx: jax.jvp(lambda x: after_manoeuvr
 pull_amplitudes = jax.jit(lambda x, weight, dv: jax.vjp(lambda x: after_manoeuvre(x, weight), x)[1](dv)[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weight", [0.0, 1.0], ids=["A", "B"])
 @pytest.mark.parametrize("amplitudes", [(1.9, 0.8), (0.0, 0.8), (1.9, 0.0), (0.0, 0.0)])
 def test_by_the_amplitudes(weight, amplitudes):

@@ -51,8 +51,18 @@ def test_values(name):
     assert "lapack_" not in text
 
 
-@pytest.mark.parametrize("mode", [jax.jacrev, jax.jacfwd])
-@pytest.mark.parametrize("name", CALLS)
+LONG = [(name, jax.jacrev) for name in ("simulate", "rotation_history")]
+"""Derivatives that take longest to trace."""
+
+
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [
+        pytest.param(name, mode, marks=[pytest.mark.slow] * ((name, mode) in LONG), id=f"{name}-{mode.__name__}")
+        for name in CALLS
+        for mode in (jax.jacrev, jax.jacfwd)
+    ],
+)
 def test_derivatives(name, mode):
     function, arguments = batched(mode(total(CALLS[name]), argnums=(0, 1)))
     text = program(function, *arguments)

@@ -43,6 +43,7 @@ def test_two_joints_go_round_their_whole_box():
         )
 
 
+@pytest.mark.slow
 def test_a_clearance_is_kept_and_costs_turn():
     """Rods folded onto each other: with a clearance the loop turns less, and keeps it, as proven from outside."""
     options = {"corners": 4, "starts": 4, "max_steps": 60, "lower": -3.0, "upper": 3.0}

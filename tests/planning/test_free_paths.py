@@ -61,6 +61,7 @@ def test_travel_is_little(found):
     assert found.travel[3] == 0
 
 
+@pytest.mark.slow
 def test_the_command_line(capsys, monkeypatch, tmp_path):
     """A small turn, which takes a small loop: corners in the table, path in the file, a picture."""
     monkeypatch.setenv("REOJAX_CACHE", "0")
@@ -78,6 +79,7 @@ def test_the_command_line(capsys, monkeypatch, tmp_path):
     np.testing.assert_allclose(turned, Rotation.from_rotvec([0, 0, np.deg2rad(2)]).as_matrix(), atol=1e-8)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_reached_ends_closest_and_says_so():
     """Within 5 degrees no polygon of a few corners makes a half turn, but it can turn towards it."""
     narrow = np.deg2rad(5)

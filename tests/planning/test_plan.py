@@ -74,6 +74,7 @@ def test_what_some_manoeuvres_made_takes_no_more(loops):
     assert (more.manoeuvres <= loops).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loops", [3, 5])
 def test_what_is_barely_within_reach_is_reached(loops):
     """Targets that take all the bending there is, many of which no fewer loops reach."""
@@ -82,6 +83,7 @@ def test_what_is_barely_within_reach_is_reached(loops):
     assert plan.manoeuvres.max() <= loops
 
 
+@pytest.mark.slow
 def test_identity_half_turns_and_small_turns():
     """Also about pitch, about which no single manoeuvre turns."""
     turns = [np.zeros(3), *np.pi * np.eye(3), *1e-4 * np.eye(3), *1e-7 * np.eye(3)]
@@ -118,6 +120,7 @@ def test_out_of_reach_is_the_closest_plan():
     assert apart(plan.rotation[None], far[None]) == pytest.approx(plan.error)
 
 
+@pytest.mark.slow
 def test_a_planar_robot_turns_in_its_plane_only():
     """Elsewhere the closest plan is to do nothing."""
     robot = robots.planar(4).replace(layout=reojax.FOUR_BODY)
@@ -129,6 +132,7 @@ def test_a_planar_robot_turns_in_its_plane_only():
     assert plan.status.endswith("28.6479 deg are left at the least")
 
 
+@pytest.mark.slow
 def test_less_travel_when_travel_counts():
     targets = Rotation.random(6, random_state=5).as_matrix()
     few, short = PLAN(targets), PLAN(targets, objective="travel")

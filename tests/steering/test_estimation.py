@@ -79,6 +79,7 @@ def errors(ends) -> np.ndarray:
     return np.array([so3.angle(jnp.asarray(GOAL.T @ end)) for end in np.asarray(ends)])
 
 
+@pytest.mark.slow
 def test_it_helps_a_robot_whose_inertias_are_wrong(flown, free):
     """Inertias off by 10 %, momentum, drag, noise, latency, dropped frames: most of the error is taken back."""
     steered, alone = errors(flown[0]), errors(free[0])

@@ -110,6 +110,7 @@ def test_what_it_refuses(options, said):
         righting(given.pop("robot"), given.pop("target"), **given)
 
 
+@pytest.mark.slow
 def test_clearance_is_proven_along_the_whole_motion():
     """No sample between the nodes is nearer than what is said, and what is said is not far from the nearest."""
     found = righting(ROBOT, TARGETS[1], momentum=MOMENTA[1], duration=0.62, clearance=0.004)

@@ -2,6 +2,7 @@
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from scipy.integrate import solve_ivp
 
 import reojax
@@ -98,6 +99,7 @@ def test_a_divers_arms_make_the_twist():
     assert abs(twists - expected) < 0.2 * expected
 
 
+@pytest.mark.slow
 def test_a_satellite_ends_in_a_spin_without_nutation():
     """The arm brings a principal axis of its end posture along the momentum: from there on the spin is steady."""
     robot = robots.satellite_arm()

@@ -28,6 +28,7 @@ def test_cubature_has_the_mean_and_the_covariance():
     np.testing.assert_allclose((points - MEAN).T @ (shares[:, None] * (points - MEAN)), root @ root.T, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_one_motion_for_all_misses_less_than_that_for_the_mean():
     """In the mean square, over its own momenta by another simulation, and over others with the same covariance."""
     found = reojax.righting_for_all(
@@ -57,6 +58,7 @@ def test_a_single_try_keeps_to_the_limits():
     assert beyond < 3e-4
 
 
+@pytest.mark.slow
 def test_a_table_is_exact_at_its_corners_and_within_its_bound_between():
     """Random momenta in the grid, by `simulate`: none misses by more than the cell says, and the bound is not idle."""
     axes = [m + 0.5 * s * np.array([-1.0, 1.0]) for m, s in zip(MEAN, 0.4 * np.diag(INERTIA), strict=True)]
