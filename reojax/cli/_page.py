@@ -26,8 +26,8 @@ def check_page(args: argparse.Namespace) -> None:
 
 def write_page(args: argparse.Namespace, robot: "Robot", motion: Any, *, title: str, target: Any = None) -> None:
     """Write the page, if one is asked for."""
-    from reojax.viewer import view
-
     if args.html is not None:
+        from reojax.viewer import view  # takes as long to import as some answers to compute
+
         asked = getattr(args, "clearance", None) is not None
         view(robot, motion, args.html, title=title, target=target, clearance=asked or None)
