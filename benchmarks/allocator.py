@@ -14,7 +14,9 @@ import time
 
 import numpy as np
 
-CASES = [("value", n) for n in (1, 100, 1024, 3000, 100_000)] + [("gradient", n) for n in (100, 300, 1024)]
+CASES = [("value", n) for n in (1, 100, 1024, 3000, 100_000)] + [
+    ("gradient", n) for n in (1, 100, 300, 1024, 3000, 10_000)
+]
 TURNS = 3
 
 
