@@ -10,15 +10,15 @@ from atlas_parts.store import Row
 from atlas_parts.subjects import subject
 from reojax import so3
 
-SHARED = "three.js"
-"""The library that draws, six parts in seven of a page by itself."""
+SHARED = ("three.js", "page.js")
+"""A page's scripts, in its order: the library that draws and the page's own, nine tenths of a page by itself."""
 _SCRIPT = re.compile(r"<script>(.*?)</script>", re.DOTALL)
 _POLICY = ("script-src 'unsafe-inline';", "script-src 'unsafe-inline' 'self' file:;")
 """What a page allows itself to load: as `view` writes it, and with what lies beside it."""
 
 
 def write(name: str, row: Row, folder: Path) -> Path | None:
-    """Write the page of one run of a robot's farthest turn, and the shared library; None where nothing was found."""
+    """Write the page of one run of a robot's farthest turn, and the shared scripts; None where nothing was found."""
     reached = {turn: found for turn, found in row["turns"].items() if found["reached"]}
     if not reached:
         return None
@@ -41,9 +41,13 @@ def write(name: str, row: Row, folder: Path) -> Path | None:
 
 
 def share(page: Path) -> None:
-    """Take the longest script out of a page, put it beside it, and allow the page to load what lies there."""
-    text = page.read_text("utf-8")
-    longest = max(_SCRIPT.finditer(text), key=lambda found: len(found[1]))
-    (page.parent / SHARED).write_text(longest[1], "utf-8")
-    text = f'{text[: longest.start()]}<script src="{SHARED}"></script>{text[longest.end() :]}'
+    """Take the scripts out of a page, put them beside it, and allow the page to load what lies there."""
+    names = iter(SHARED)
+
+    def beside(script: re.Match[str]) -> str:
+        name = next(names)
+        (page.parent / name).write_text(script[1], "utf-8")
+        return f'<script src="{name}"></script>'
+
+    text = _SCRIPT.sub(beside, page.read_text("utf-8"))
     page.write_text(text.replace(*_POLICY, 1), "utf-8")

@@ -30,6 +30,7 @@ from common.markdown import table
 import reojax
 from atlas_parts.store import Row, Store
 from atlas_parts.subjects import Subject, box_of
+from atlas_parts.turns import answers
 
 _BATCH = 512
 _NEAR = 24
@@ -128,7 +129,7 @@ def bound_of(subject: Subject, turns: Row, *, quick: bool = False) -> Row:
 
 def jobs(subjects: list[Subject], store: Store, quick: bool) -> list[tuple[str, Callable[[], Row]]]:
     """A row for each robot of question 1."""
-    turned = store.under("turns")
+    turned = answers(store.under("turns"))
     return [(s.name, lambda s=s: bound_of(s, turned[s.name], quick=quick)) for s in subjects if s.name in turned]
 
 

@@ -24,6 +24,8 @@ _TRIES = 2
 """Numbers of runs tried, each a quarter more than the one before, or one."""
 _EVEN, _RANDOM = (1.0, 0.6, 0.4), 2
 """Shares of the box of joint limits, and number of random boxes."""
+_HELD = (1.0, 0.4, 0.2, 0.1)
+"""Shares of that box within which all pairs are held apart."""
 _CORNERS = ((4, 8), (8, 6), (10**9, 5))
 """Free corners of robots of up to so many joints."""
 _SAMPLES = 48
@@ -122,14 +124,34 @@ def boxed_turns(
     return best, largest
 
 
+def held_turns(subject: Subject, targets: np.ndarray, effort: Effort) -> Turns:
+    """Turns that keep the subject's clearance, by a search that holds all pairs of shapes apart at every step.
+
+    Within smaller and smaller boxes about the posture at rest, as far as targets are left: of a robot with many joints
+    hardly a random polygon of the whole box is clear, and out of deep contact the search finds no way.
+    """
+    found = _nothing(subject, targets)
+    for share in _HELD:
+        if found.reached.all():
+            break
+        low, high = _box(subject, np.full((2, subject.robot.joints), share))
+        search = _Search(subject.robot, subject.clearance, effort, low, high)
+        _improve(found, None, subject, targets, search, proof=subject.clearance)
+    return found
+
+
 def _boxes(subject: Subject) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Boxes of joint angles about the posture at rest: shares of the robot's own, even ones, then random ones."""
-    low, high = box_of(subject)
-    start, joints = subject.start, subject.robot.joints
-    rng = np.random.default_rng(0)
+    """Boxes of joint angles about the posture at rest: even ones, then random ones."""
+    joints, rng = subject.robot.joints, np.random.default_rng(0)
     shares = [np.full((2, joints), share) for share in _EVEN]
     shares += [rng.uniform(0.1, 1.0, (2, joints)) for _ in range(_RANDOM)]
-    return [(start + one * (low - start), start + two * (high - start)) for one, two in shares]
+    return [_box(subject, share) for share in shares]
+
+
+def _box(subject: Subject, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest and largest angles (j,) of shares (2, j) of what the joints can go from rest, down and up."""
+    low, high = box_of(subject)
+    return subject.start + share[0] * (low - subject.start), subject.start + share[1] * (high - subject.start)
 
 
 def _too_near(robot: reojax.Robot, paths: list[np.ndarray], margin: float) -> set[tuple[int, int]]:

@@ -17,6 +17,7 @@ from steering_parts.flight import Sensors, Wrong, fly, many
 import reojax
 from atlas_parts.store import Row, Store
 from atlas_parts.subjects import Subject
+from atlas_parts.turns import answers
 from reojax import design, so3
 
 INERTIA, SPIN, RELEASES = 0.05, 0.05, 64
@@ -28,7 +29,7 @@ SENSORS = Sensors(np.deg2rad(1), 5, 1, 0.0, 2 * np.pi / 512 / 24, 2e-3)
 
 def jobs(subjects: list[Subject], store: Store, quick: bool) -> list[tuple[str, Callable[[], Row]]]:
     """A row for each robot whose turn is short enough."""
-    turned = {} if quick else store.under("turns")
+    turned = {} if quick else answers(store.under("turns"))
     return [
         (s.name, lambda s=s, name=name: flight(s, name, turned[s.name]["turns"][name], RELEASES))
         for s in subjects

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 import reojax
 from atlas_parts.store import Row, Store
 from atlas_parts.subjects import Subject
+from atlas_parts.turns import answers
 from reojax import design, plot
 
 FIELDS = ("mass", "com", "inertia", "anchor", "axis", "rotor_inertia", "gear_ratio")
@@ -19,7 +20,7 @@ _PREFERRED = ("roll 90", "yaw 90", "pitch 90", "roll 180", "yaw 180")
 
 def jobs(subjects: list[Subject], store: Store, quick: bool) -> list[tuple[str, Callable[[], Row]]]:
     """A row for each robot that question 1 turns."""
-    turned = {} if quick else store.under("turns")
+    turned = {} if quick else answers(store.under("turns"))
     return [
         (s.name, lambda s=s: _row(s, turned[s.name])) for s in subjects if s.name in turned and _turn(turned[s.name])
     ]

@@ -74,7 +74,7 @@ def half_turn(margin: float | None) -> Row:
 
 def fastest(near: reojax.Path, target: np.ndarray = HALF, margin: float | None = None) -> Row:
     """The fastest motion that is found from a loop, and the clearance that it is proven to have all the time."""
-    found = reojax.fastest_loop(ROBOT, target, RE_MAX_17, near, starts=1, clearance=margin)
+    found = reojax.fastest_loop(ROBOT, target, RE_MAX_17, near, clearance=margin)
     return {
         "duration_s": float(found.duration),
         "converged": bool(found.converged),

@@ -1,6 +1,6 @@
 """Question 1: what turns a robot about roll, pitch and yaw, how far one loop goes, and what a turn costs."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ from common.proof import prove
 
 import reojax
 from atlas_parts import animations
-from atlas_parts.clear_turns import Effort, Turns, boxed_turns, clear_turns, free_turns
+from atlas_parts.clear_turns import Effort, Turns, boxed_turns, clear_turns, free_turns, held_turns
 from atlas_parts.store import Row, Store
 from atlas_parts.subjects import USUAL_AXES, Subject
 from reojax import so3
@@ -22,7 +22,10 @@ ANGLES = (180, 90)
 FEW = 5
 """Up to so many joints a search is cheap, and thorough."""
 THOROUGH, USUAL, QUICK = Effort(starts=4, steps=80), Effort(starts=2, steps=40), Effort(starts=1, steps=25)
+HELD = Effort(starts=4, steps=60)
 LAWS = ("quintic", "trapezoid")
+_HELD = ", all pairs"
+"""What the keys of rows end with that are found with all pairs of shapes held apart."""
 _LOST = "not found: no loop about this axis was found that keeps the clearance"
 
 
@@ -53,6 +56,47 @@ def turns(subject: Subject, *, quick: bool = False) -> Row:
     row["most"] = {axis: _most(axis, alone, wanted) for axis in axes}
     row["farthest"] = {axis: found.farthest[wanted.index((axis, ANGLES[-1]))].tolist() for axis in axes}
     return row
+
+
+def held(subject: Subject, row: Row) -> Row:
+    """Quarter turns that a robot's row has not, with all pairs held apart; half turns are two of them."""
+    quarter = ANGLES[-1]
+    axes = [axis for axis in AXES if _is_missing(row["turns"][f"{axis} {quarter}"])]
+    wanted = [(axis, angle) for axis in axes for angle in (quarter, 2 * quarter)]
+    targets = np.array([np.asarray(so3.exp(np.deg2rad(angle) * subject.axes[axis])) for axis, angle in wanted])
+    found = held_turns(subject, targets[::2], HELD)
+    both = Turns(*(np.repeat(part, 2, axis=0) for part in found))
+    both.reached[1::2] = False
+    _double(both, wanted)
+    turned = {
+        f"{axis} {angle}": _turn(subject, both, both, targets, k) | {"free": row["turns"][f"{axis} {angle}"]["free"]}
+        for k, (axis, angle) in enumerate(wanted)
+    }
+    alone = [(axis, quarter) for axis in axes]
+    most = {axis: _most(axis, found, alone) for axis in axes}
+    return {"turns": turned, "most": most, "farthest": dict(zip(axes, found.farthest.tolist(), strict=True))}
+
+
+def _is_missing(turn: Row) -> bool:
+    """Whether a turn was not found, though it may be there."""
+    return not turn["reached"] and not turn["status"].startswith("unreachable")
+
+
+def answers(rows: dict[str, Row]) -> dict[str, Row]:
+    """Rows of this question by robot, each with what was found with all pairs held apart."""
+    merged = {}
+    for name, row in rows.items():
+        if name.endswith(_HELD):
+            continue
+        more = rows.get(f"{name}{_HELD}", {"turns": {}, "most": {}, "farthest": {}, "cpu_s": 0.0})
+        farther = [axis for axis, angle in more["most"].items() if angle > row["most"][axis]]
+        merged[name] = row | {
+            "turns": row["turns"] | {turn: found for turn, found in more["turns"].items() if found["reached"]},
+            "most": row["most"] | {axis: more["most"][axis] for axis in farther},
+            "farthest": row["farthest"] | {axis: more["farthest"][axis] for axis in farther},
+            "cpu_s": row["cpu_s"] + more["cpu_s"],
+        }
+    return merged
 
 
 def _double(found: Turns, wanted: list[tuple[str, int]]) -> None:
@@ -106,13 +150,18 @@ def _most(axis: str, found: Turns, wanted: list[tuple[str, int]]) -> float:
     return float(max([*each, *np.rad2deg(found.most[mine])]))
 
 
-def jobs(subjects: list[Subject], store: Store, quick: bool) -> list[tuple[str, Callable[[], Row]]]:
-    """A row for each robot."""
-    return [(subject.name, lambda subject=subject: turns(subject, quick=quick)) for subject in subjects]
+def jobs(subjects: list[Subject], store: Store, quick: bool) -> Iterator[tuple[str, Callable[[], Row]]]:
+    """A row for each robot, and one more for what it has not."""
+    for subject in subjects:
+        yield subject.name, lambda subject=subject: turns(subject, quick=quick)
+        row = store.rows.get(f"turns/{subject.name}", {"turns": {}})
+        if not quick and any(map(_is_missing, row["turns"].values())):
+            yield f"{subject.name}{_HELD}", lambda subject=subject, row=row: held(subject, row)
 
 
 def show(rows: dict[str, Row], out: Path) -> None:
     """Print the tables, draw the picture, and write a page for a browser for each robot."""
+    rows = answers(rows)
     columns = ["robot", "joints", "rank", "kept clear [mm]", *(f"one loop, {axis} [deg]" for axis in AXES), "CPU s"]
     print(table(columns, [
         [name, row["joints"], row["rank"], f"{1e3 * row['clearance_m']:.1f}",
