@@ -94,7 +94,7 @@ def main(
         print(
             "Amplitudes, end link inertia and gear ratio of manoeuvre A by gradients, under more and more conditions\n"
         )
-        columns = [key for key in choices[0] if key not in ("case", "waypoints", "certificate")]
+        columns = [key for key in choices[0] if key not in ("case", "status", "waypoints", "certificate")]
         table(["", *columns], [[row["case"], *(_plain(row[key]) for key in columns)] for row in choices], width=16)
         answer["converged"] &= all(row["converged"] for row in choices)
     plot.save(_picture(loops, curves, target), picture)

@@ -60,7 +60,7 @@ def show(rows: dict[str, Row], out: Path) -> None:
 
 
 def _verdicts(case: Row) -> list[str]:
-    """Whether it converged, or how many starts did, and whether the certificate holds."""
-    converged = case["converged"]
-    many = f"{converged} of {case['starts']}" if "starts" in case else "yes" if converged else "no"
+    """How it ended, or how many starts converged, and whether the certificate holds."""
+    ended = case["status"].partition(":")[0]
+    many = f"{case['converged']} of {case['starts']}, best {ended}" if "starts" in case else ended
     return [many, "holds" if case["certificate"]["holds"] else "fails"]

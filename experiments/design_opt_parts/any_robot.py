@@ -117,6 +117,7 @@ class _Designs:
         return {
             "case": name,
             "converged": int(found.converged.sum()),
+            "status": found.message[found.best],
             "starts": len(found.cost),
             "travel_deg": float(np.rad2deg(np.abs(np.diff(path, axis=0)).sum())),
             "ends": float(values["ends"]),

@@ -51,6 +51,7 @@ def _row(name: str, aim: Any, conditions: list[Any], roll: float, margin: float)
     return {
         "case": name,
         "converged": bool(found.converged[found.best]),
+        "status": found.message[found.best],
         "twist_deg": float(np.rad2deg(values["twist"])),
         "bend_deg": float(np.rad2deg(values["bend"])),
         "inertia_kg_mm2": 1e6 * values["inertia"],
