@@ -24,8 +24,8 @@ _TRIES = 2
 """Numbers of runs tried, each a quarter more than the one before, or one."""
 _EVEN, _RANDOM = (1.0, 0.6, 0.4), 2
 """Shares of the box of joint limits, and number of random boxes."""
-_HELD = (1.0, 0.4, 0.2, 0.1)
-"""Shares of that box within which all pairs are held apart."""
+_HELD = ((9, (1.0, 0.4)), (10**9, (0.4, 0.2, 0.1)))
+"""Shares of that box within which all pairs are held apart, of robots of up to so many joints."""
 _CORNERS = ((4, 8), (8, 6), (10**9, 5))
 """Free corners of robots of up to so many joints."""
 _SAMPLES = 48
@@ -131,7 +131,7 @@ def held_turns(subject: Subject, targets: np.ndarray, effort: Effort) -> Turns:
     hardly a random polygon of the whole box is clear, and out of deep contact the search finds no way.
     """
     found = _nothing(subject, targets)
-    for share in _HELD:
+    for share in next(shares for most, shares in _HELD if subject.robot.joints <= most):
         if found.reached.all():
             break
         low, high = _box(subject, np.full((2, subject.robot.joints), share))
