@@ -88,12 +88,10 @@ def answers(rows: dict[str, Row]) -> dict[str, Row]:
     for name, row in rows.items():
         if name.endswith(_HELD):
             continue
-        more = rows.get(f"{name}{_HELD}", {"turns": {}, "most": {}, "farthest": {}, "cpu_s": 0.0})
-        farther = [axis for axis, angle in more["most"].items() if angle > row["most"][axis]]
+        more = rows.get(f"{name}{_HELD}", {"turns": {}, "most": {}, "cpu_s": 0.0})
         merged[name] = row | {
             "turns": row["turns"] | {turn: found for turn, found in more["turns"].items() if found["reached"]},
-            "most": row["most"] | {axis: more["most"][axis] for axis in farther},
-            "farthest": row["farthest"] | {axis: more["farthest"][axis] for axis in farther},
+            "most": {axis: max(angle, more["most"].get(axis, 0.0)) for axis, angle in row["most"].items()},
             "cpu_s": row["cpu_s"] + more["cpu_s"],
         }
     return merged
