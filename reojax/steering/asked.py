@@ -17,7 +17,11 @@ _TURNS = 20.0
 
 
 def posture(robot: Robot, entry: str, value: Any) -> np.ndarray:
-    """A posture (j,) within the joint limits, coupled joints where their drivers put them."""
+    """A posture (j,) within the joint limits, coupled joints where their drivers put them [rad].
+
+    Raises:
+        ValueError: naming `entry`, the joint, its angle and the rule.
+    """
     angles = np.asarray(checks.numbers(entry, value, (robot.joints,)))
     low, high = np.asarray(robot.lower), np.asarray(robot.upper)
     out = (angles < low - 1e-9) | (angles > high + 1e-9)
@@ -37,7 +41,13 @@ def posture(robot: Robot, entry: str, value: Any) -> np.ndarray:
 
 
 def reasonable(robot: Robot, start: np.ndarray, momenta: np.ndarray, duration: float) -> None:
-    """Ask about a momentum that is likely in another unit."""
+    """Ask about momenta (m, 3) [kg m^2/s] that imply, in the posture `start` (j,), a body rate or turns beyond reason.
+
+    The body rate is `A^-1 H`; the turns are what it makes in the `duration` [s].
+
+    Raises:
+        ValueError: naming the largest, and what it implies.
+    """
     inertia = np.asarray(momentum_matrices(robot, start).A)
     rates = np.linalg.norm(np.linalg.solve(inertia, momenta.T), axis=0)
     worst = int(np.argmax(rates))

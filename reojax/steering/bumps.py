@@ -13,7 +13,11 @@ from reojax._internal.arrays import Array
 
 
 def bumps(time: Float[Array, ""], duration: Array, count: int) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
-    """Values of all bumps at one time, each 1 at its highest, and their rates [1/s]."""
+    """Values of all bumps at one time, each 1 at its highest, and their rates [1/s].
+
+    With `u` the distance from a bump's middle in widths, `((2 - |u|)_+^3 - 4 (1 - |u|)_+^3) / 4`: the cubic B-spline
+    (C. de Boor, A Practical Guide to Splines, 1978). `time` and `duration` in seconds.
+    """
     width = duration / (count + 3)
     u = time / width - jnp.arange(2, count + 2, dtype=duration.dtype)
     outer, inner = jnp.maximum(2 - jnp.abs(u), 0), jnp.maximum(1 - jnp.abs(u), 0)

@@ -58,7 +58,11 @@ def keep_of(robot: Robot, trajectory: Trajectory, clearance: float) -> Keep:
 
 
 def towards(robot: Robot, keep: Keep, planned: Float[Array, " j"], wanted: Float[Array, " j"]) -> Float[Array, " j"]:
-    """As far from the planned posture towards the one that is wanted as is proven to keep the clearance [rad]."""
+    """As far from the planned posture towards the one that is wanted as is proven to keep the clearance [rad].
+
+    From a share `s` of the way, the next one is `s + min over pairs of (distance - margin) / (moved by the whole way)`
+    (conservative advancement: B. Mirtich, thesis, Berkeley 1996).
+    """
     change = wanted - planned
     most = keep.per_angle @ jnp.abs(change)
 

@@ -16,7 +16,18 @@ from reojax.steering.gains import CorrectionGains
 
 @partial(jax.jit, static_argnums=1)
 def drift_of(robot: Robot, chosen: tuple[Parameter, ...], gains: CorrectionGains, momentum: Array) -> Array:
-    """(m, 3, 4 + q) turn of the end from each sample on per momentum, drag and parameters, by the trapezoid rule."""
+    """(m, 3, 4 + q) turn of the end from each sample on per momentum, drag and parameters, by the trapezoid rule.
+
+    Inertial frame; columns in rad per kg m^2/s (3), per N m s/rad (1), and per unit of each parameter. By momentum it
+    is `integral of Phi R A^-1 R^T`, with `Phi` what an error becomes at the end; drag takes `drag R omega` of the
+    momentum in each unit of time; by a parameter p it is `integral of Phi R d omega / d p`.
+
+    Args:
+        robot: the robot as planned.
+        chosen: the parameters.
+        gains: of the motion, whose samples (m,) it takes.
+        momentum: (3,) that the motion was planned for, inertial frame [kg m^2/s].
+    """
     values = jnp.asarray([p.start for p in chosen], momentum.dtype)
 
     def rates(theta: Array, rate: Array, rotation: Array, to_end: Array) -> tuple[Array, Array, Array]:

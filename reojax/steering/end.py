@@ -39,7 +39,10 @@ class Basis(NamedTuple):
 
 @cache
 def basis(pieces: int, steps: int) -> Basis:
-    """The splines, and the places where an integration of `steps` steps a piece reads them. NumPy alone."""
+    """The splines, and the places where an integration of `steps` steps a piece reads them. NumPy alone.
+
+    Of all curves through the points, at rest at both ends, that of least integrated squared jerk: a quintic spline.
+    """
     coefficients = _least_jerk(pieces)
     width = 1 / pieces
     shares = step_nodes(steps) * width  # (steps, 5)
@@ -89,19 +92,30 @@ def _least_jerk(pieces: int) -> np.ndarray:
 
 
 def end_of(robot: Robot, points: Float[Array, "p+1 j"], duration: Array, momentum: Array, steps: int) -> Array:
-    """Orientation at the ends of all steps (s + 1, 3, 3); all of one dtype, nothing is checked."""
+    """Orientation at the ends of all steps (s + 1, 3, 3), base to inertial frame, from the identity.
+
+    `R' = R hat(A^-1 (B theta' + R^T H))` by Runge and Kutta of sixth order (`reojax.mechanics.integrators`). All of
+    one dtype, nothing is checked.
+
+    Args:
+        robot: the robot.
+        points: (p + 1, j) of the spline [rad].
+        duration: of the motion [s].
+        momentum: (3,) inertial frame [kg m^2/s].
+        steps: of each piece, static.
+    """
     own = basis(points.shape[0] - 1, steps)
     dtype = points.dtype
     theta = jnp.asarray(own.stages[:, :, 0], dtype) @ points
     rate = jnp.asarray(own.stages[:, :, 1], dtype) @ points / duration
 
-    def turning(theta: Array, rate: Array) -> tuple[Array, Array]:
+    def rate_terms(theta: Array, rate: Array) -> tuple[Array, Array]:
         A, B = momentum_matrices(robot, theta)
         both = solve_symmetric3(A, jnp.concatenate([(B @ rate)[:, None], jnp.eye(3, dtype=dtype)], axis=1))
         return both[:, 0], both[:, 1:]
 
     count, joints = own.stages.shape[0], points.shape[1]
-    a, m = jax.vmap(turning)(theta.reshape(-1, joints), rate.reshape(-1, joints))
+    a, m = jax.vmap(rate_terms)(theta.reshape(-1, joints), rate.reshape(-1, joints))
     length = jnp.full(count, 1 / count, dtype) * duration
     return orientations(length, a.reshape(count, 5, 3), m.reshape(count, 5, 3, 3), momentum)
 
@@ -134,10 +148,10 @@ def _by_nodes(known: Instant, rate: Float[Array, "n j"], length: Array, momentum
     """Orientation at the ends of all steps, Runge-Kutta of fourth order on the nodes where the slope is known too."""
     eye = jnp.eye(3, dtype=rate.dtype)
 
-    def turning(A: Array, B: Array, rate: Array) -> Array:
+    def rate_terms(A: Array, B: Array, rate: Array) -> Array:
         return solve_symmetric3(A, jnp.concatenate([(B @ rate)[:, None], eye], axis=1))
 
-    both = jax.vmap(turning)(known.A, known.B, rate)
+    both = jax.vmap(rate_terms)(known.A, known.B, rate)
     nodes = jnp.stack([both[:-1:2], both[1::2], both[2::2]], axis=1)
 
     def step(r: Array, node: Array) -> tuple[Array, Array]:

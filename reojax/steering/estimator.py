@@ -49,10 +49,14 @@ class Model:
 def omega_and_slopes(
     robot: Robot, chosen: tuple[Parameter, ...], values: Array, theta: Array, rate: Array, rotation: Array, h: Array
 ) -> tuple[Array, Array]:
-    """Angular velocity of the base, and its slopes (3, 4 + q) by momentum, drag (none) and parameters."""
+    """Angular velocity of the base `A^-1 (B theta' + R^T H)` [rad/s], and its slopes (3, 4 + q).
+
+    Both in the base frame; slopes by the momentum in the base frame `A^-1 R^T` (3), by the drag (none, 0), and by each
+    parameter. Angles and rates (j,) in rad and rad/s, `rotation` (3, 3), `h` (3,) in the inertial frame [kg m^2/s].
+    """
 
     def omega(values: Array) -> tuple[Array, Array]:
-        A, B = momentum_matrices(changed(robot, chosen, values), theta)
+        A, B = momentum_matrices(robot_with(robot, chosen, values), theta)
         both = solve_symmetric3(A, jnp.concatenate([(B @ rate + rotation.T @ h)[:, None], rotation.T], axis=1))
         return both[:, 0], both
 
@@ -64,15 +68,15 @@ def omega_and_slopes(
     return both[:, 0], jnp.concatenate([both[:, 1:], jnp.zeros((3, 1), values.dtype), slopes], axis=1)
 
 
-def changed(robot: Robot, chosen: tuple[Parameter, ...], values: Array) -> Robot:
-    """The robot with other values of the chosen parameters."""
+def robot_with(robot: Robot, chosen: tuple[Parameter, ...], values: Array) -> Robot:
+    """The robot with other values (q,) of the chosen parameters, in their own units."""
     for k, entry in enumerate(chosen):
         robot = entry.put(robot, values[k])
     return robot
 
 
 def off(model: Model, values: Array) -> Array:
-    """How far the parameters are from what the motion was planned with."""
+    """How far the parameters (q,) are from what the motion was planned with."""
     return values - jnp.asarray([p.start for p in model.parameters], values.dtype)
 
 
@@ -95,7 +99,22 @@ def along(
     offsets: Array,
     spread: bool,
 ) -> Estimate:
-    """The estimate at `end`, along the joints as they were read, with its covariance if `spread`."""
+    """The estimate at `end`, along the joints as they were read, with its covariance if `spread`.
+
+    `R' = R hat(omega)` and `H' = -drag R omega` in steps of 4 ms at most, fourth order in the turn; the covariance
+    of a left error `exp(e) R` by `P <- F P F^T + Q`, with `e' = R d omega` to first order (Markley 2003).
+
+    Args:
+        model: what the estimator goes by.
+        robot: with the parameters as they are estimated.
+        state: drag and parameters.
+        at: the estimate at `begin`.
+        begin: time [s].
+        end: time, not before `begin` [s].
+        times: (n,) when the joints were read [s].
+        offsets: (n, j) how far they were from the motion [rad]; between two times by straight lines.
+        spread: whether the covariance is carried along, static.
+    """
     count = jnp.maximum(jnp.ceil((end - begin) / _LONGEST - 1e-6), 1)
     h = (end - begin) / count
     size = 7 + len(model.parameters)
@@ -138,10 +157,13 @@ def _rate(robot: Robot, theta: Array, rate: Array, rotation: Array, momentum: Ar
     return solve_symmetric3(A, (B @ rate + rotation.T @ momentum)[:, None])[:, 0]
 
 
-def corrected(
+def kalman_update(
     model: Model, state: SteeringState, at: Estimate, seen: Array, fresh: Bool[Array, ""]
 ) -> tuple[Estimate, Array, Array]:
-    """Kalman's correction by one orientation; no change where it is not fresh."""
+    """Kalman's correction by one orientation, with drag and parameters; no change where it is not fresh.
+
+    The innovation is `log(seen R^T)`, inertial frame [rad], of covariance `P_ee + noise^2 I`.
+    """
     p = at.covariance
     miss = so3.log(seen @ at.rotation.T)
     total = p[:3, :3] + model.noise**2 * jnp.eye(3, dtype=p.dtype)

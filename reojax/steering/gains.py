@@ -171,7 +171,7 @@ def _gains(
     g = to_end @ g
     weight = nodes.shape * _ramp(nodes.at, window)
     direction = weight[:, :, None, None] * (spread(robot, price) @ g.swapaxes(2, 3))
-    gramian = remaining(nodes, g @ direction)
+    gramian = integral_to_end(nodes, g @ direction)
     # an error about the hardest axis shrinks to `left`; the rest is rounding where no joint can turn it at all
     full = gramian[0]
     rest = left * jnp.maximum(least_eigenvalue(full), 1e-6 * jnp.trace(full))
@@ -184,7 +184,7 @@ def _gains(
     direction, to_end, theta, rate, rotation = map(first, (direction, to_end, *own))
     stiff = gramian + rest * jnp.eye(3, dtype=dtype)[None]
     gain = direction @ jax.vmap(solve_symmetric3)(stiff, to_end)
-    gamma, omega = jax.vmap(partial(_turning, robot, nodes.momentum))(theta, rate, rotation)
+    gamma, omega = jax.vmap(partial(_connection_and_rate, robot, nodes.momentum))(theta, rate, rotation)
     authority = jax.vmap(least_eigenvalue)(gramian)
     room = jnp.clip(jnp.minimum(robot.upper[None] - theta, theta - robot.lower[None]), 0, LINEAR)
     reach = _reach(direction, gramian, to_end, room, authority > rest)
@@ -207,7 +207,7 @@ def _gains(
 
 
 def spread(robot: Robot, price: Float[Array, " j"]) -> Float[Array, "j j"]:
-    """`W^-1` of the joints that are free, with those that are coupled to them carried along."""
+    """`W^-1` (j, j) of the joints that are free, with those that are coupled to them carried along; `price` is `W`."""
     carry = jnp.eye(robot.joints, dtype=price.dtype)
     for number, (joint, driver) in enumerate(robot.couplings):
         carry = carry.at[joint, joint].set(0).at[joint, driver].set(robot.coupling_ratio[number])
@@ -216,7 +216,7 @@ def spread(robot: Robot, price: Float[Array, " j"]) -> Float[Array, "j j"]:
     return (carry * jnp.where(whole > 0, 1 / jnp.where(whole > 0, whole, 1), 0)[None]) @ carry.T
 
 
-def remaining(nodes: Nodes, values: Float[Array, "m 3 a b"]) -> Float[Array, "m+1 a b"]:
+def integral_to_end(nodes: Nodes, values: Float[Array, "m 3 a b"]) -> Float[Array, "m+1 a b"]:
     """Integral of `values` from each sample to the end, by Simpson's rule."""
     length = nodes.at[:, 2] - nodes.at[:, 0]
     part = (length / 6)[:, None, None] * (values[:, 0] + 4 * values[:, 1] + values[:, 2])
@@ -260,7 +260,9 @@ def _transitions(nodes: Nodes, growth: Float[Array, "m 3 3 3"]) -> Float[Array, 
     return jax.lax.scan(back, jnp.eye(3, dtype=growth.dtype), (length, growth), reverse=True)[1]
 
 
-def _turning(robot: Robot, momentum: Array, theta: Array, rate: Array, rotation: Array) -> tuple[Array, Array]:
+def _connection_and_rate(
+    robot: Robot, momentum: Array, theta: Array, rate: Array, rotation: Array
+) -> tuple[Array, Array]:
     """Connection and angular velocity of the base."""
     gamma = connection(robot, theta)
     return gamma, gamma @ rate + base_velocity(robot, theta, jnp.zeros_like(rate), momentum=rotation.T @ momentum)

@@ -14,11 +14,11 @@ from reojax.mechanics.momentum import connection
 from reojax.robot import Robot
 from reojax.steering.bumps import bumps
 from reojax.steering.clear_of_itself import Keep, towards
-from reojax.steering.estimator import Estimate, Model, along, changed, corrected, off
+from reojax.steering.estimator import Estimate, Model, along, kalman_update, off, robot_with
 from reojax.steering.least_change import Effort, steer_to
 from reojax.steering.linear_law import row_at, smooth, steer_by
 from reojax.steering.prediction import Ahead, ahead_of, miss_and_slope
-from reojax.steering.readings import MEMORY, Believed, Reading, References, SteeringState, checked
+from reojax.steering.readings import MEMORY, Believed, Reading, References, SteeringState, check_reading
 
 
 @partial(
@@ -77,12 +77,12 @@ class SteeringLaw:
             ValueError: if the reading comes out of order, is older than what is remembered, has another shape, or an
                 orientation is no rotation. NaN is no mistake: a sensor that says nothing.
         """
-        return _update(self, state, checked(self.model.robot, state, reading))
+        return _update(self, state, check_reading(self.model.robot, state, reading))
 
     def believed(self, state: SteeringState) -> Believed:
         """What is known after the last reading, in the inertial frame of the first motion."""
         return Believed(
-            robot=changed(self.model.robot, self.model.parameters, state.values),
+            robot=robot_with(self.model.robot, self.model.parameters, state.values),
             taken=state.taken,
             rotation=self.frame @ state.rotation,
             momentum=self.frame @ state.momentum,
@@ -145,11 +145,11 @@ def _update(law: SteeringLaw, state: SteeringState, reading: Reading) -> tuple[S
     fresh = jnp.isfinite(seen).all() & (taken > state.taken)
     until = jnp.where(fresh, taken, state.taken)
     start = Estimate(state.rotation, state.momentum, state.covariance)
-    robot = changed(law.model.robot, law.model.parameters, state.values)
+    robot = robot_with(law.model.robot, law.model.parameters, state.values)
     then = along(law.model, robot, state, start, state.taken, until, times, offsets, True)
-    then, drag, values = corrected(law.model, state, then, jnp.where(fresh, seen, then.rotation), fresh)
+    then, drag, values = kalman_update(law.model, state, then, jnp.where(fresh, seen, then.rotation), fresh)
     state = state._replace(drag=drag, values=values)
-    robot = changed(law.model.robot, law.model.parameters, values)
+    robot = robot_with(law.model.robot, law.model.parameters, values)
     now = along(law.model, robot, state, then, until, time, times, offsets, False)
     worth = 1 - jnp.exp(-(time - state.time) / law.settle)
     if law.steps:

@@ -16,14 +16,14 @@ from reojax._internal.linalg import cholesky, cholesky_solve
 from reojax.steering.end import end_and_slope
 from reojax.steering.free_points import free_points
 from reojax.steering.limits import FEASIBLE, RightingTask, bounds, conditions_and_slopes, states
-from reojax.steering.newton import STEPS, Judged, effort_form, judged, rows_at_steps
+from reojax.steering.newton import STEPS, Judged, assessment, effort_form, rows_at_steps
 
 _PRICE = 1e4
 """Of the square of a limit that is passed, against the mean square of the miss."""
 _EFFORT = 1e-6
 """Of the effort, which decides where the miss does not."""
 _BACK = (1.0, 0.99, 0.97, 0.94, 0.88, 0.75, 0.5, 0.0)
-"""Shares of the way from the start that are judged: less than all where the end is beyond a limit."""
+"""Shares of the way from the start that are assessment: less than all where the end is beyond a limit."""
 
 
 class _State(NamedTuple):
@@ -45,7 +45,7 @@ def solve_for_all(
     shares: Float[Array, " k"],
     duration: Array,
 ) -> tuple[Judged, Float[Array, "m k"]]:
-    """From each start the answer, judged at the mean momentum, and the angles that each of the momenta leaves."""
+    """From each start the answer, assessment at the mean momentum, and the angles that each of the momenta leaves."""
     one = partial(_solve_one, task, pieces, max_steps)
     return jax.vmap(one, (0, None, None, None, None))(points, goal, momenta, shares, duration)
 
@@ -99,7 +99,7 @@ def _solve_one(task: RightingTask, pieces: int, max_steps: int | Array, points, 
         """At the mean momentum, by the worst of all; and the angles that they leave."""
         points = variables.of(x + share * (s.x - x))
         every = jnp.concatenate([(shares @ momenta)[None], momenta])
-        each = jax.vmap(lambda h: judged(task, pieces, points, goal, h, duration, jnp.asarray(max_steps)))(every)
+        each = jax.vmap(lambda h: assessment(task, pieces, points, goal, h, duration, jnp.asarray(max_steps)))(every)
         mean = jax.tree.map(lambda leaf: leaf[0], each)
         return mean._replace(beyond=each.beyond[1:].max()), each.error[1:]
 

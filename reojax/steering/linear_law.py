@@ -24,7 +24,11 @@ def steer_by(
     tau: Array,
     largest: Array,
 ) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
-    """The linear part, `onboard.corrected`: the new steering vector, and what was left of the error before."""
+    """The linear part, `onboard.corrected`: the new steering vector, and what was left of the error before [rad].
+
+    `c + worth (gramian + rest)^-1 (e - gramian c - held back)`, arguments as there: `steer`, `filtered` (3,) and
+    `rate` (3,) per second, `error` (3,) in the inertial frame, `tau` in seconds, `largest` in rad.
+    """
     held_back = row["density"] @ (2 * tau * (filtered - steer) + tau**2 * rate)
     left = error - row["gramian"] @ steer - held_back
     can = row["gramian"] - 2 * tau * row["density"] + row["rest"] * jnp.eye(3, dtype=tau.dtype)
@@ -34,7 +38,7 @@ def steer_by(
 
 
 def smooth(steer: Array, filtered: Array, rate: Array, step: Array, tau: Array) -> tuple[Array, Array]:
-    """`onboard.smooth`."""
+    """`onboard.smooth`: the filter `tau^2 c'' + 2 tau c' + c = steer`, `step` seconds later, exactly."""
     gap, decay = filtered - steer, jnp.exp(-step / tau)
     slope = rate + gap / tau
     return steer + (gap + step * slope) * decay, (rate - step / tau * slope) * decay

@@ -135,7 +135,7 @@ def miss_and_slope(
 
 
 def miss_of(ahead: Ahead, steer: Array, filtered: Array, rate: Array) -> Float[Array, "3"]:
-    """What the end misses alone."""
+    """What the end misses alone, arguments and result as of `miss_and_slope`."""
     known, theta_dot, _ = _instants(ahead, steer, filtered, rate)
     return so3.log(_history(ahead, known, theta_dot)[-1] @ ahead.goal.T) - ahead.bias
 
@@ -159,10 +159,10 @@ def _history(ahead: Ahead, known: Instant, theta_dot: Float[Array, "k j"]) -> Fl
     """Orientations at the ends of all steps, from both ends and the middle of each."""
     eye, length = jnp.eye(3, dtype=theta_dot.dtype), ahead.length
 
-    def turning(A: Array, B: Array, rate: Array) -> Array:
+    def rate_terms(A: Array, B: Array, rate: Array) -> Array:
         return solve_symmetric3(A, jnp.concatenate([(B @ rate)[:, None], eye], axis=1))
 
-    both = jax.vmap(turning)(known.A, known.B, theta_dot)
+    both = jax.vmap(rate_terms)(known.A, known.B, theta_dot)
     nodes = jnp.stack([both[:-1:2], both[1::2], both[2::2]], axis=1)
 
     def step(carry: tuple[Array, Array], node: Array) -> tuple[tuple[Array, Array], Array]:

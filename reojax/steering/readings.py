@@ -89,8 +89,13 @@ class SteeringState(NamedTuple):
     """Its rate."""
 
 
-def checked(robot: Robot, state: SteeringState, reading: Reading) -> Reading:
-    """The reading, or a `ValueError` that says what is wrong with it."""
+def check_reading(robot: Robot, state: SteeringState, reading: Reading) -> Reading:
+    """The reading as arrays, NaN where a sensor says nothing.
+
+    Raises:
+        ValueError: naming the field, if a shape is wrong, the time is not finite or not after the last one, the
+            orientation is no rotation, or was taken later than it was read, before the last one, or too long ago.
+    """
     checks.instance("reading", reading, Reading, "Reading(time, theta, rotation, taken)")
     time, theta, rotation, taken = (np.asarray(as_numbers(f, v)) for f, v in reading._asdict().items())
     joints = robot.joints

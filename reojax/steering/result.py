@@ -76,7 +76,7 @@ class Righting(NamedTuple):
 
 
 def trajectory_through(points: Float[np.ndarray, "p+1 j"], duration: float) -> Trajectory:
-    """The spline of least jerk through points at equal times, at rest at both ends."""
+    """The spline of least jerk through points (p + 1, j) [rad] at equal times, at rest at both ends; duration in s."""
     own = basis(len(points) - 1, 1)
     pieces = len(own.coefficients)
     powers = (1 / duration) ** np.arange(6)

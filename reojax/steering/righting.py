@@ -9,7 +9,6 @@ the joints' limits, the motors and the clearance allow. Several starts run side 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -26,7 +25,7 @@ from reojax.robot import Robot
 from reojax.steering.asked import posture, reasonable
 from reojax.steering.limits import RightingTask
 from reojax.steering.result import Righting
-from reojax.steering.search import least_durations, search
+from reojax.steering.search import LANES, Search, least_durations
 
 _SPARE = 1e-3
 """Clearance that is kept at the nodes beyond what is asked, for what lies between them [m]."""
@@ -52,6 +51,7 @@ def righting(
     max_steps: int = 40,
     seed: int = 0,
     shorten: bool = True,
+    about: ArrayLike | None = None,
 ) -> Righting:
     """Find a joint motion after which a robot with angular momentum has the target orientation and posture.
 
@@ -71,6 +71,9 @@ def righting(
         max_steps: Newton steps from each start, at most.
         seed: of the random motions among which starts are looked for.
         shorten: whether to look for `least_duration` where the motors cannot do it, which takes many searches.
+        about: (3,) axis, base frame, about which the robot may be turned in any way at the end: `[0, 0, 1]` where it
+            has to land on its feet and may face anywhere. `error` is then the angle to the nearest end that will do.
+            Default: about none.
 
     Returns:
         The motion of least effort of those that converged first; where none did, the best, with `converged` False, and
@@ -83,7 +86,7 @@ def righting(
     goal = checks.rotations("target", target)
     momenta = checks.numbers("momentum", momentum, (3,))[None]
     many = _righting(robot, goal[None], momenta, duration, start, end, motors, clearance, weights, pieces, starts,
-                     tolerance, max_steps, seed, shorten)  # fmt: skip
+                     tolerance, max_steps, seed, shorten, about)  # fmt: skip
     return Righting(*(field[0] for field in many))
 
 
@@ -93,7 +96,7 @@ def righting_many(
     targets: ArrayLike,
     *,
     momenta: ArrayLike,
-    duration: float,
+    duration: float | None,
     start: ArrayLike | None = None,
     end: ArrayLike | None = None,
     motors: Motor | Sequence[Motor] | None = None,
@@ -105,6 +108,7 @@ def righting_many(
     max_steps: int = 40,
     seed: int = 0,
     shorten: bool = True,
+    about: ArrayLike | None = None,
 ) -> Righting:
     """`righting` for many releases side by side: `targets` (m, 3, 3) or one for all, `momenta` (m, 3).
 
@@ -116,11 +120,11 @@ def righting_many(
     else:
         goals = checks.rotations("targets", targets, (-1, 3, 3))
     return _righting(robot, goals, given, duration, start, end, motors, clearance, weights, pieces, starts, tolerance,
-                     max_steps, seed, shorten)  # fmt: skip
+                     max_steps, seed, shorten, about)  # fmt: skip
 
 
 def _righting(robot, goals, momenta, duration, start, end, motors, clearance, weights, pieces, starts, tolerance,
-              max_steps, seed, shorten) -> Righting:  # fmt: skip
+              max_steps, seed, shorten, about) -> Righting:  # fmt: skip
     """Check everything, search, and where the motors cannot do it, look for the least duration."""
     starts = checks.whole("starts", starts)
     tolerance, max_steps = checks.positive("tolerance", tolerance), checks.whole("max_steps", max_steps)
@@ -131,15 +135,17 @@ def _righting(robot, goals, momenta, duration, start, end, motors, clearance, we
     h = momenta
     if len(h) != len(goals):
         raise ValueError(f"`momenta` has {len(h)} rows for {len(goals)} targets.")
-    task, pieces = task_of(robot, h, seconds, start, end, motors, clearance, weights, pieces)
-    look = partial(search, task, pieces=pieces, starts=starts, tolerance=tolerance, max_steps=max_steps, seed=seed)
+    task, pieces = task_of(robot, h, seconds, start, end, motors, clearance, weights, pieces, about)
+    look = Search(task, pieces, starts, tolerance, max_steps, seed, 2 if len(h) == 1 else min(LANES, len(h)))
     found = look(goals, h, np.full(len(h), seconds))
     if duration is not None and (motors is None or not shorten or found.converged.all()):
         return found
     return least_durations(look, found, goals, h, keep=duration is not None)
 
 
-def task_of(robot, momenta, seconds, start, end, motors, clearance, weights, pieces) -> tuple[RightingTask, int]:
+def task_of(
+    robot, momenta, seconds, start, end, motors, clearance, weights, pieces, about=None
+) -> tuple[RightingTask, int]:
     """What all motions of a search share, checked, and the pieces of their splines."""
     checks.instance("robot", robot, Robot, "`make_robot` makes")
     checks.on_host("robot", robot, "righting")
@@ -157,6 +163,12 @@ def task_of(robot, momenta, seconds, start, end, motors, clearance, weights, pie
             raise ValueError(f"`weights` is {price.tolist()}; each must be positive.")
     if clearance is not None and not robot.collision_pairs:
         raise ValueError(f"`clearance` is {clearance}, but {robot.name!r} has no collision pairs.")
+    axis = np.zeros(3)
+    if about is not None:
+        axis = np.asarray(checks.numbers("about", about, (3,)))
+        if not (size := np.linalg.norm(axis)) > 0:
+            raise ValueError(f"`about` is {axis.tolist()}; it must have a direction.")
+        axis = axis / size
     known = None if motors is None else check_motors(motors, robot)
     least, spare = None, np.zeros(())
     if clearance is not None:
@@ -168,5 +180,5 @@ def task_of(robot, momenta, seconds, start, end, motors, clearance, weights, pie
         spare = np.minimum(_SPARE, min(kept.values()) - least)
     plain = without_names(robot, shapes=least is not None, couplings=True)  # one program for all robots of this tree
     task = RightingTask(plain, None if known is None else per_joint(known, np.dtype(float)), least, spare, first, last,
-                price / price.mean())  # fmt: skip
+                price / price.mean(), axis)  # fmt: skip
     return jax.tree.map(lambda x: jnp.asarray(x, float), task), pieces

@@ -96,13 +96,13 @@ def _header(table: dict[str, np.ndarray], name: str) -> str:
         sizes = "".join(f"[{size}]" for size in values.shape)
         lines.append(f"/* {_MEANING[field]} */")
         lines.append(f"static const float {name}_{field}{sizes} = {{")
-        lines += [f"  {_braced(np.asarray(row))}," for row in values]
+        lines += [f"  {_c_literal(np.asarray(row))}," for row in values]
         lines.append("};")
     return "\n".join([*lines, f"#endif /* {guard} */", ""])
 
 
-def _braced(values: np.ndarray) -> str:
+def _c_literal(values: np.ndarray) -> str:
     if values.ndim:
-        return "{" + ", ".join(_braced(value) for value in values) + "}"
+        return "{" + ", ".join(_c_literal(value) for value in values) + "}"
     text = f"{np.float32(values):.9g}"
     return f"{text}f" if any(c in text for c in ".en") else f"{text}.0f"

@@ -10,8 +10,11 @@ import pytest
 import reojax
 from reojax import RE_MAX_17, robots, so3
 from reojax.optimisation.status import Status
+from reojax.steering.limits import nearest
 from reojax.steering.result import Righting, trajectory_through
-from reojax.steering.righting import righting, righting_many
+from reojax.steering.righting import righting, righting_many, task_of
+from reojax.steering.search import least_durations
+from reojax.steering.starts import RobotKey, starts_of
 
 ROBOT = robots.prototype()
 INERTIA = np.asarray(reojax.momentum_matrices(ROBOT, np.zeros(3)).A)
@@ -41,6 +44,89 @@ def test_without_momentum_it_is_a_loop_that_turns_the_robot():
     """The net rotation of its path at zero momentum, which does not depend on time."""
     path = reojax.polygon(np.asarray(reojax.simulate(ROBOT, one(2).trajectory, samples=64).theta))
     assert so3.angle(reojax.net_rotation(ROBOT, path, steps=1).T @ TARGETS[2]) < 1e-4
+
+
+def test_the_end_may_be_turned_about_an_axis_of_the_base():
+    """Feet down, facing anywhere: the axis ends where the target has it, with less effort than the whole target."""
+    found = righting_many(ROBOT, TARGETS, momenta=MOMENTA, duration=0.62, about=[0, 0, 2.0])
+    assert found.converged.all()
+    assert (found.error < 1e-6).all()
+    turned = []
+    for i in range(3):
+        own = Righting(*(field[i] for field in found))
+        end = np.asarray(reojax.simulate(ROBOT, own.trajectory, momentum=MOMENTA[i], samples=48).rotation[-1])
+        assert np.abs(end[:, 2] - TARGETS[i][:, 2]).max() < 2e-6
+        turned.append(float(so3.angle(end.T @ TARGETS[i])))
+    assert max(turned) > 0.1
+    assert found.effort.sum() < 0.9 * FOUND.effort.sum()
+
+
+def test_the_nearest_end():
+    """`nearest` against a search over all turns about the axis; for no axis, the goal itself."""
+    task = task_of(ROBOT, MOMENTA, 0.62, None, None, None, None, None, None, [1.0, 2.0, -1.0])[0]
+    rng = np.random.default_rng(0)
+    turns = np.linspace(-np.pi, np.pi, 721)[:, None] * np.asarray(task.about)
+    for _ in range(5):
+        goal, now = (np.asarray(so3.exp(jnp.asarray(v))) for v in rng.normal(size=(2, 3)))
+        best = so3.angle(now.T @ nearest(task, goal, now))
+        others = jax.vmap(lambda turn, goal=goal, now=now: so3.angle(now.T @ goal @ so3.exp(turn)))(turns)
+        assert best <= others.min() + 1e-12
+        assert best > others.min() - 1e-2
+        none = task._replace(about=np.zeros(3))
+        np.testing.assert_allclose(nearest(none, goal, now), goal, atol=1e-15)
+
+
+def test_loops_turn_further_than_random_motions():
+    """Of a robot of many joints, whose random motions turn it little."""
+    robot = robots.planar(8)
+    key = RobotKey(robot)
+    still = np.zeros(robot.joints).tobytes()
+    turns = np.asarray(jax.vmap(so3.angle)(starts_of(key, 8, 0, still, still).ends))
+    middle = len(turns) // 2
+    assert np.median(turns[middle:]) > 2 * np.median(turns[:middle])
+
+
+def test_least_durations_of_many_releases():
+    """Of releases that can do with durations known beforehand: each is found from above, to a few per cent."""
+    least = np.array([0.31, 0.62, 0.7, 1.9, 40.0])
+    count = len(least)
+    calls = []
+
+    class Known:
+        def __call__(self, goals, momenta, durations, guesses=None):
+            calls.append(len(goals))
+            can = np.asarray(durations) >= least[np.asarray(goals, int)]
+            row = {name: np.zeros(len(goals)) for name in Righting._fields}
+            row |= {"duration": np.array(durations, float), "converged": can, "points": np.zeros((len(goals), 8, 3))}
+            return Righting(**(row | {"least_duration": np.full(len(goals), np.nan)}))
+
+    numbers = np.arange(count)
+    first = Known()(numbers, numbers, np.full(count, 0.62))
+    found = least_durations(Known(), first, numbers, numbers, keep=False)
+    np.testing.assert_array_equal(found.converged, [True] * 4 + [False])
+    ratio = found.duration[:4] / least[:4]
+    assert (ratio >= 1).all()
+    assert (ratio < 1.05).all()
+    np.testing.assert_array_equal(found.least_duration[:4], found.duration[:4])
+    assert np.isnan(found.least_duration[4])
+    kept = least_durations(Known(), first, numbers, numbers, keep=True)
+    np.testing.assert_array_equal(kept.duration, np.full(count, 0.62))
+    assert np.isnan(kept.least_duration[[0, 1, 4]]).all()
+    assert (kept.least_duration[[2, 3]] >= least[[2, 3]]).all()
+    assert max(calls) == count
+
+
+@pytest.mark.slow
+def test_least_times_within_the_motors():
+    """Side by side: each within its motors by the simulation, and near to what they can do."""
+    found = righting_many(ROBOT, TARGETS[:2], momenta=MOMENTA[:2], duration=None, motors=RE_MAX_17, starts=3, pieces=5)
+    assert found.converged.all()
+    np.testing.assert_array_equal(found.duration, found.least_duration)
+    for i in range(2):
+        own = Righting(*(field[i] for field in found))
+        motion = reojax.simulate(ROBOT, own.trajectory, momentum=MOMENTA[i], motors=RE_MAX_17, samples=64)
+        assert so3.angle(motion.rotation[-1].T @ TARGETS[i]) < 1e-5
+        assert -3e-3 < np.asarray(motion.margin).min() < 0.3
 
 
 def test_conservation_by_muj_co():
@@ -101,6 +187,7 @@ def test_too_short_for_the_motors():
         ({"duration": None}, "motors"),
         ({"start": [9.0, 0, 0]}, "goes from"),
         ({"weights": [1, 0, 1]}, "positive"),
+        ({"about": [0, 0, 0]}, "direction"),
         ({"clearance": 0.001, "robot": ROBOT.replace(collision_pairs=())}, "collision pairs"),
     ],
 )

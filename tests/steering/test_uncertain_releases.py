@@ -48,12 +48,13 @@ def test_one_motion_for_all_misses_less_than_that_for_the_mean():
 
 def test_a_single_try_keeps_to_the_limits():
     """Where the least miss lies near them: converged means within, in float64 whatever JAX's default."""
+    robot = ROBOT.replace(lower=np.maximum(ROBOT.lower, -3.5), upper=np.minimum(ROBOT.upper, 3.5))
     with jax.enable_x64(False):
-        found = reojax.righting_for_all(ROBOT, TARGET, momentum=MEAN, covariance=COVARIANCE, duration=0.62, tries=1)
+        found = reojax.righting_for_all(robot, TARGET, momentum=MEAN, covariance=COVARIANCE, duration=0.62, tries=1)
     assert found.motion.points.dtype == np.float64
     fine = np.asarray(jax.vmap(found.motion.trajectory.at)(np.linspace(0, 0.62, 400)).theta)
-    beyond = max((fine - np.asarray(ROBOT.upper)).max(), (np.asarray(ROBOT.lower) - fine).max())
-    assert fine.min() < ROBOT.lower.min() + 0.05
+    beyond = max((fine - np.asarray(robot.upper)).max(), (np.asarray(robot.lower) - fine).max())
+    assert beyond > -0.05
     assert found.motion.converged
     assert beyond < 3e-4
 
