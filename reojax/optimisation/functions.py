@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property, lru_cache, partial
+from functools import lru_cache, partial
+from threading import Lock
 from typing import Any, NamedTuple
 
 import jax
@@ -146,18 +147,23 @@ def _compile(
 
 
 class _Program:
-    """One of the two, for blocks of one size; compiled when it is first asked for."""
+    """One of the two, for blocks of one size; compiled when it is first asked for, once for all threads."""
 
     def __init__(self, lowered: Any, equalities: int) -> None:
         """Keep what has been traced."""
-        self._lowered, self.equalities = lowered, equalities
+        self.equalities = equalities
+        self._lock = Lock()
+        self._lowered: Any = lowered
+        self._compiled: Any = None
 
-    @cached_property
+    @property
     def compiled(self) -> Function:
-        """The program; what it was made of is let go."""
-        compiled = self._lowered.compile()
-        del self._lowered
-        return compiled
+        """The program; what it was made of is let go. Each has a lock of its own, so that two compile at once."""
+        with self._lock:
+            if self._compiled is None:
+                self._compiled = self._lowered.compile()
+                self._lowered = None
+            return self._compiled
 
 
 @lru_cache(maxsize=128)
