@@ -12,7 +12,16 @@ from reojax._internal.arrays import Array
 from reojax._internal.result_text import printed_as
 from reojax.collision.constraint import with_spare
 from reojax.motion._feasibility import beyond, ends_of, restore_feasibility
-from reojax.motion._transcription import Apart, Numbers, Task, Transcription, UnknownBox, numbers_of
+from reojax.motion._transcription import (
+    Apart,
+    Numbers,
+    Programs,
+    Task,
+    Transcription,
+    UnknownBox,
+    numbers_of,
+    programs_of,
+)
 from reojax.motion.least_time import minimum_stretch
 from reojax.motion.trajectory import Trajectory, stretch
 from reojax.motion.trajectory_clearance import trajectory_clearance
@@ -92,19 +101,20 @@ class _Programs(NamedTuple):
     task: Task
     box: UnknownBox
     conditions: Transcription
+    compiled: Programs
     numbers: Numbers
 
     def build(self, x: Array) -> Trajectory:
-        return self.conditions.build(x, self.numbers)
+        return self.compiled.build(x, self.numbers)
 
     def rotation_left(self, trajectory: Trajectory) -> Array:
-        return self.conditions.rotation_left(trajectory, self.numbers)
+        return self.compiled.rotation_left(trajectory, self.numbers)
 
 
 def least_duration(task: Task, starts: np.ndarray, box: UnknownBox, max_steps: int, progress: bool | str) -> Fastest:
     """Solve a task from several starts, (m, n); the best answer is restored, and run as fast as its motors allow."""
     conditions = Transcription(task.parametrisation, ends_of(task.robot), task.apart is not None)
-    programs = _Programs(task, box, conditions, numbers_of(task, box))
+    programs = _Programs(task, box, conditions, programs_of(conditions), numbers_of(task, box))
     if task.apart is None:
         answer = _solve(programs, starts, np.zeros(0), max_steps, progress)
     else:
@@ -129,7 +139,7 @@ def _solve(
     programs: _Programs, starts: np.ndarray, wanted: np.ndarray, max_steps: int, progress: bool | str
 ) -> _Answer:
     """Optimise from all starts, restore the best, and stretch it to what the motors give."""
-    task, box, conditions, numbers = programs
+    task, box, conditions, compiled, numbers = programs
     found = optimise_together(
         conditions, starts, lower=box.lower, upper=box.upper, scale=box.scale,
         data=np.tile(wanted, (len(starts), 1)), shared=numbers, tolerance=_TOLERANCE, slope_tolerance=_SLOPE,
@@ -137,7 +147,7 @@ def _solve(
     )  # fmt: skip
     best = np.asarray(found.value[found.best], float)
     if not task.parametrisation.keeps_rotation or beyond(task.robot, programs.build(best)) > _ROUNDING:
-        linearisation = lambda x, share: conditions.linearisation(x, share, wanted, numbers)
+        linearisation = lambda x, share: compiled.linearisation(x, share, wanted, numbers)
         limits = box.lower, box.upper, box.scale
         best = restore_feasibility(linearisation, programs.build, programs.rotation_left, best, limits)
     trajectory = programs.build(best)

@@ -6,8 +6,9 @@ farthest, which feasibility restoration sees. Angular velocities at Gauss nodes 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import jax
@@ -96,7 +97,7 @@ def numbers_of(task: Task, box: UnknownBox) -> Numbers:
 
 @dataclass(frozen=True)
 class Transcription:
-    """The conditions of a kind of task as functions of its unknowns (n,) and numbers; hashable, the key of programs."""
+    """The conditions of a kind of task as functions of its unknowns (n,) and numbers; hashable, see `programs_of`."""
 
     parametrisation: Parametrisation
     ends: Ends
@@ -116,12 +117,10 @@ class Transcription:
         inequality = jnp.concatenate([past, self._further(x, theta, wanted, numbers)])
         return self.parametrisation.duration(x), self._rotation_error(turned, numbers), inequality
 
-    @partial(jax.jit, static_argnums=0)
     def build(self, x: Array, numbers: Numbers) -> Trajectory:
         """The motion."""
         return self.parametrisation.build(x, numbers.motion)
 
-    @partial(jax.jit, static_argnums=0)
     def linearisation(self, x: Array, share: Array, wanted: Array, numbers: Numbers) -> Linearised:
         """The conditions where the joints are farthest, without motors, and their derivatives.
 
@@ -141,7 +140,6 @@ class Transcription:
 
         return linearise(exact, x)
 
-    @partial(jax.jit, static_argnums=0)
     def rotation_left(self, trajectory: Trajectory, numbers: Numbers) -> Float[Array, "3"]:
         """Rotation vector from the goal to a motion's net rotation, finely integrated."""
         return so3.log(numbers.goal.T @ net_rotation_of(numbers.robot, trajectory, _FINE))
@@ -174,6 +172,26 @@ class Transcription:
     def _rotation_error(self, turned: Array, numbers: Numbers) -> Array:
         """Rotation vector (3,) from the goal, where not all unknowns have it."""
         return jnp.zeros(0) if self.parametrisation.keeps_rotation else so3.log(numbers.goal.T @ turned)
+
+
+class Programs(NamedTuple):
+    """Methods of a `Transcription`, compiled where they are first called."""
+
+    build: Callable[..., Trajectory]
+    linearisation: Callable[..., Linearised]
+    rotation_left: Callable[..., Array]
+
+
+@lru_cache(maxsize=64)
+def programs_of(kind: Transcription) -> Programs:
+    """The programs of a kind of task; of the last few kinds, for what has a kind as a static argument is never let go.
+
+    The optimiser keeps those of as many.
+    """
+    return Programs(*(jax.jit(partial(method, kind)) for method in _COMPILED))
+
+
+_COMPILED = Transcription.build, Transcription.linearisation, Transcription.rotation_left
 
 
 def _node(numbers: Numbers, theta: Array, theta_dot: Array, theta_ddot: Array) -> tuple[Array, Array]:
