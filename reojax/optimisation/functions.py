@@ -85,7 +85,9 @@ class Programs:
         Raises:
             ValueError: if a function does not return real numbers of the right rank.
         """
-        self._data, self._shared = jax.tree.map(np.asarray, data), jax.tree.map(jnp.asarray, shared)
+        self._data = jax.tree.map(np.asarray, data)
+        # through the host: the programs run on the default device, wherever numbers come from
+        self._shared = jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)), shared)
         self._dtype = x.dtype
         self._blocks = _VALUES_BLOCK, _power_of_two(min(len(x), BLOCK))
         types = Given(_types(self._data, 1), _types(self._shared, 0))
