@@ -23,7 +23,7 @@ _PRICE = 1e4
 _EFFORT = 1e-6
 """Of the effort, which decides where the miss does not."""
 _BACK = (1.0, 0.99, 0.97, 0.94, 0.88, 0.75, 0.5, 0.0)
-"""Shares of the way from the start that are assessment: less than all where the end is beyond a limit."""
+"""Shares of the way from the start at which motions are assessed: less than all where the end is beyond a limit."""
 
 
 class _State(NamedTuple):
@@ -45,7 +45,7 @@ def solve_for_all(
     shares: Float[Array, " k"],
     duration: Array,
 ) -> tuple[Judged, Float[Array, "m k"]]:
-    """From each start the answer, assessment at the mean momentum, and the angles that each of the momenta leaves."""
+    """From each start the answer, assessed at the mean momentum, and the angles that each of the momenta leaves."""
     one = partial(_solve_one, task, pieces, max_steps)
     return jax.vmap(one, (0, None, None, None, None))(points, goal, momenta, shares, duration)
 

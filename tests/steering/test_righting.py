@@ -96,9 +96,11 @@ def test_least_durations_of_many_releases():
         def __call__(self, goals, momenta, durations, guesses=None):
             calls.append(len(goals))
             can = np.asarray(durations) >= least[np.asarray(goals, int)]
-            row = {name: np.zeros(len(goals)) for name in Righting._fields}
-            row |= {"duration": np.array(durations, float), "converged": can, "points": np.zeros((len(goals), 8, 3))}
-            return Righting(**(row | {"least_duration": np.full(len(goals), np.nan)}))
+            m = len(goals)
+            row = {name: np.zeros(m) for name in Righting._fields}
+            row |= {"momentum": np.zeros((m, 3)), "omega": np.zeros((m, 3)), "rotation": np.zeros((m, 3, 3))}
+            row |= {"duration": np.array(durations, float), "converged": can, "points": np.zeros((m, 8, 3))}
+            return Righting(**(row | {"least_duration": np.full(m, np.nan)}))
 
     numbers = np.arange(count)
     first = Known()(numbers, numbers, np.full(count, 0.62))
