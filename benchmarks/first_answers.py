@@ -37,7 +37,7 @@ from reojax import design
 robot = {robot}
 loop = design.polygons(robot, {corners})
 problem = design.Problem(lambda v: (robot, loop.path(v["loop"])), [loop], objective=design.travel(loop),
-                         equality=[design.turned_to({target})], steps=4)
+                         equality=[design.turned_to(reojax.so3.exp(np.array({target})))], steps=4)
 problem.solve(problem.starts(8, seed=1), max_steps=1)
 """
 TASKS: dict[str, list[str]] = {
