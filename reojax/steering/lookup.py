@@ -19,10 +19,10 @@ from reojax.motion.motor import Motor
 from reojax.motion.trajectory import Trajectory
 from reojax.robot import Robot
 from reojax.steering.end import end_of
-from reojax.steering.limits import FEASIBLE
 from reojax.steering.newton import EXACT_STEPS, solve
 from reojax.steering.result import trajectory_through
 from reojax.steering.righting import righting, task_of
+from reojax.steering.search import in_lanes
 
 _SAFETY = 2.0
 """Times the second differences that were seen, for those that were not."""
@@ -126,16 +126,17 @@ def righting_table(
     rings = np.abs(np.moveaxis(np.indices(shape), 0, -1) - middle).sum(-1)
     for ring in range(1, rings.max() + 1):
         here = [tuple(i) for i in np.argwhere(rings == ring)]
-        for begin in range(0, len(here), _LANES):
-            part = here[begin : begin + _LANES]
-            lanes = [part[min(k, len(part) - 1)] for k in range(_LANES)]
-            guess = np.stack([_inward(points, good, i, middle) for i in lanes])
-            h = np.stack([grid[i] for i in lanes])
-            goals, durations = np.tile(goal, (_LANES, 1, 1)), np.full(_LANES, seconds)
-            out = jax.tree.map(np.asarray, solve(task, pieces, max_steps, guess, goals, h, durations, tolerance))
-            for k, i in enumerate(part):
-                points[i] = out.points[k]
-                good[i] = out.error[k] <= tolerance and out.beyond[k] <= FEASIBLE
+        guess = np.stack([_inward(points, good, i, middle) for i in here])
+        h = np.stack([grid[i] for i in here])
+        goals, durations = np.tile(goal, (len(here), 1, 1)), np.full(len(here), seconds)
+        out = in_lanes(
+            _LANES,
+            lambda p, g, h, t: solve(task, pieces, max_steps, p, g, h, t, tolerance),
+            (guess, goals, h, durations),
+        )
+        reached = out.reached(tolerance)
+        for k, i in enumerate(here):
+            points[i], good[i] = out.points[k], reached[k]
     for i in np.argwhere(~good):  # not found from its neighbours: by a search of its own
         at = tuple(i)
         own = righting(robot, goal, momentum=grid[at], duration=seconds, start=start, end=end, motors=motors,

@@ -48,6 +48,10 @@ class Judged(NamedTuple):
     margin: Array
     steps: Array
 
+    def reached(self, tolerance: float) -> Array:
+        """Whether motions end within the tolerance [rad] of their targets and keep all limits."""
+        return (self.error <= tolerance) & (self.beyond <= FEASIBLE)
+
 
 class _Iterate(NamedTuple):
     x: Array

@@ -22,7 +22,7 @@ from reojax.steering.end import basis
 from reojax.steering.limits import FEASIBLE, RightingTask
 from reojax.steering.newton import EXACT_STEPS, Judged, judge, solve
 from reojax.steering.result import Righting, trajectory_through
-from reojax.steering.starts import CHUNK, RobotKey, ends_of, starts_of
+from reojax.steering.starts import CHUNK, RobotKey, Starts, ends_of, starts_of
 
 LANES = 32
 """Motions that are searched for side by side, at most."""
@@ -63,6 +63,7 @@ def _best(look: Search, goals, momenta, durations, guesses) -> Judged:
     table = starts_of(
         RobotKey(look.task.robot), look.pieces, look.seed, look.task.start.tobytes(), look.task.end.tobytes()
     )
+    inertia = np.asarray(momentum_matrices(look.task.robot, look.task.start).A)
     rows, m = _Rows(np.asarray(goals), np.asarray(momenta), np.asarray(durations)), len(goals)
     order: list[np.ndarray | None] = [None] * m
     best: dict[int, tuple] = {}
@@ -74,7 +75,7 @@ def _best(look: Search, goals, momenta, durations, guesses) -> Judged:
         picked, points = [], []
         for i in waiting:
             if order[i] is None or tried[i] == per_round:
-                order[i] = _order(look, table, rows.of(i), order[i], tried[i])
+                order[i] = _order(look, table, inertia, rows.of(i), order[i], tried[i])
             own = order[i][tried[i] : tried[i] + per_round]  # pyright: ignore[reportOptionalSubscript]
             picked += [i] * len(own)
             points.append(table.points[own])
@@ -83,9 +84,10 @@ def _best(look: Search, goals, momenta, durations, guesses) -> Judged:
     return Judged(*(np.stack(leaf) for leaf in zip(*(best[i][2] for i in range(m)), strict=True)))
 
 
-def _order(look: Search, table, row: _Rows, before: np.ndarray | None, tried: int) -> np.ndarray:
+def _order(
+    look: Search, table: Starts, inertia: np.ndarray, row: _Rows, before: np.ndarray | None, tried: int
+) -> np.ndarray:
     """Starts, the nearest to the target first: by their ends after a drift, and if these failed by their true ends."""
-    inertia = np.asarray(momentum_matrices(look.task.robot, look.task.start).A)
     if before is None:
         drift = np.asarray(so3.exp(jnp.asarray(np.linalg.solve(inertia, row.momenta) * row.durations)))
         return np.argsort(-_cosine(look, drift @ table.ends, row.goals))[: max(look.starts, CHUNK)]
@@ -112,7 +114,7 @@ def _take(look: Search, best: dict[int, tuple], rows: _Rows, picked: np.ndarray,
     out = _found(look, points, rows.of(picked))
     for lane, i in enumerate(picked):
         one = Judged(*(leaf[lane] for leaf in out))
-        good = bool(one.error <= look.tolerance and one.beyond <= FEASIBLE)
+        good = bool(one.reached(look.tolerance))
         rank = (not good, float(one.effort) if good else float(one.error + one.beyond))
         if i not in best or rank < best[i][1]:
             best[i] = (good, rank, one)
@@ -123,7 +125,7 @@ def _found(look: Search, points: np.ndarray, rows: _Rows) -> Judged:
     free = look.task._replace(motors=None)
 
     def by(task: RightingTask, points: np.ndarray, rows: _Rows) -> Judged:
-        return _in_lanes(
+        return in_lanes(
             look.lanes,
             lambda p, g, h, t: solve(task, look.pieces, look.max_steps, p, g, h, t, look.tolerance),
             (points, *rows),
@@ -132,11 +134,10 @@ def _found(look: Search, points: np.ndarray, rows: _Rows) -> Judged:
     out = by(free, points, rows)
     if look.task.motors is None:
         return out
-    able = (out.error <= look.tolerance) & (out.beyond <= FEASIBLE)
-    driven = _in_lanes(
+    driven = in_lanes(
         look.lanes, lambda p, g, h, t, n: judge(look.task, look.pieces, p, g, h, t, n), (out.points, *rows, out.steps)
     )
-    over = np.flatnonzero(able & (driven.beyond > FEASIBLE))
+    over = np.flatnonzero(np.asarray(out.reached(look.tolerance) & (driven.beyond > FEASIBLE)))
     if len(over):
         again = by(look.task, np.asarray(out.points)[over], rows.of(over))
         for mine, theirs in zip(driven, again, strict=True):
@@ -144,7 +145,7 @@ def _found(look: Search, points: np.ndarray, rows: _Rows) -> Judged:
     return driven
 
 
-def _in_lanes(lanes: int, function: Any, arguments: tuple[Any, ...]) -> Judged:
+def in_lanes(lanes: int, function: Any, arguments: tuple[Any, ...]) -> Judged:
     """A function of arrays with one leading axis, so many rows at a time; the last ones are filled up."""
     size, parts = len(arguments[0]), []
     for first in range(0, size, lanes):
@@ -157,7 +158,7 @@ def _answer(look: Search, goals, momenta, durations, best: Judged) -> Righting:
     """What is told of the motions that were found."""
     task, m = look.task, len(goals)
     points, error, beyond, effort, rotation, omega, margin, steps = (np.asarray(leaf) for leaf in best)
-    good = (error <= look.tolerance) & (beyond <= FEASIBLE)
+    good = np.asarray(best.reached(look.tolerance))
     nothing = np.full(m, np.nan)
     clear = nothing.copy()
     if task.clearance is not None:
