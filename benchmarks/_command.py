@@ -6,7 +6,7 @@ import platform
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import Any
 import jax
 from systems._measure import CORES
 
+import reojax
 from reojax.session import hold_memory, one_device_per_core
 
 PACKAGES = (
@@ -32,6 +33,24 @@ def options(doc: str | None) -> argparse.ArgumentParser:
     parser.add_argument("--quick", action="store_true", help="smaller and noisier, for trying out")
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for results (default: out)")
     return parser
+
+
+def comparison_options(doc: str | None) -> argparse.ArgumentParser:
+    """The same for commands that choose rows and compare with another version."""
+    parser = options(doc)
+    parser.add_argument("--against", type=Path, metavar="FOLDER", help="root of another version's files")
+    parser.add_argument("--only", nargs="+", metavar="TEXT", help="rows whose names contain one of these")
+    return parser
+
+
+def versions(against: Path | None) -> dict[str, Path]:
+    """Roots of the versions to compare, this one first."""
+    return {"this": Path(reojax.__file__).parents[1]} | ({"other": against} if against else {})
+
+
+def chosen(names: Iterable[str], only: list[str] | None) -> list[str]:
+    """The rows that are asked for."""
+    return [name for name in names if only is None or any(text in name for text in only)]
 
 
 def run(main: Callable[..., None], parser: argparse.ArgumentParser) -> None:

@@ -15,9 +15,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from _command import machine, options, run, say
+from _command import chosen, comparison_options, machine, run, say, versions
 
-import reojax
 from reojax.files import check_writable, write_json
 
 _BEGIN = """
@@ -66,8 +65,8 @@ TASKS: dict[str, list[str]] = {
 def main(out: Path, *, quick: bool, against: Path | None, only: list[str] | None) -> None:
     """Measure, print and write."""
     result = check_writable(out / "first_answers.json")
-    homes = {"this": Path(reojax.__file__).parents[1]} | ({"other": against} if against else {})
-    names = [name for name in TASKS if only is None or any(text in name for text in only)]
+    homes = versions(against)
+    names = chosen(TASKS, only)
     rows = []
     print("| first answer [s] | " + " | ".join(f"{home}, no cache | kept programs" for home in homes) + " |")
     print("|---|" + "--:|" * 2 * len(homes))
@@ -93,7 +92,4 @@ def _seconds(name: str, home: Path, folder: str) -> float:
 
 
 if __name__ == "__main__":
-    parser = options(__doc__)
-    parser.add_argument("--against", type=Path, metavar="FOLDER", help="root of another version's files")
-    parser.add_argument("--only", nargs="+", metavar="TEXT", help="rows whose names contain one of these")
-    run(main, parser)
+    run(main, comparison_options(__doc__))

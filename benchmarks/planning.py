@@ -14,18 +14,17 @@ import subprocess
 import sys
 from pathlib import Path
 
-from _command import machine, options, run, say
+from _command import chosen, comparison_options, machine, run, say, versions
 from _planning_rows import ROWS
 
-import reojax
 from reojax.files import check_writable, write_json
 
 
 def main(out: Path, *, quick: bool, against: Path | None, only: list[str] | None) -> None:
     """Measure by turns, print and write."""
     result = check_writable(out / "planning.json")
-    homes = {"this": Path(reojax.__file__).parents[1]} | ({"other": against} if against else {})
-    names = [name for name in ROWS if only is None or any(text in name for text in only)]
+    homes = versions(against)
+    names = chosen(ROWS, only)
     turns: dict[str, list[dict]] = {home: [] for home in homes}
     for turn in range(1 if quick else 3):
         for home, place in homes.items():
@@ -55,7 +54,4 @@ def _turn(home: Path, names: list[str], share: float) -> dict[str, dict[str, flo
 
 
 if __name__ == "__main__":
-    parser = options(__doc__)
-    parser.add_argument("--against", type=Path, metavar="FOLDER", help="root of another version's files")
-    parser.add_argument("--only", nargs="+", metavar="TEXT", help="rows whose names contain one of these")
-    run(main, parser)
+    run(main, comparison_options(__doc__))
