@@ -2,13 +2,18 @@
 
     python benchmarks/first_answers.py                      # two minutes; --quick: one turn
     python benchmarks/first_answers.py --against FOLDER     # beside another version, unpacked there, by turns
+    taskset -c 0 python benchmarks/first_answers.py --processor --turns 5   # on one core, by its time
 
 Every command and script runs in a process of its own, start of Python included, by the clock: first with an empty cache
-of compiled programs, then with what that run has left there. The least of three turns. `--only TEXT ...` takes the rows
-whose names contain one. Writes first_answers.json.
+of compiled programs, then with what that run has left there. The least of the turns, or with `--processor` the median of
+the processor time. Python's own byte code is there beforehand, as where reojax is installed. `--only TEXT ...` takes the
+rows whose names contain one. Writes first_answers.json.
 """
 
+import compileall
 import os
+import resource
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -62,34 +67,48 @@ TASKS: dict[str, list[str]] = {
 """What runs, as arguments of Python."""
 
 
-def main(out: Path, *, quick: bool, against: Path | None, only: list[str] | None) -> None:
+def main(out: Path, *, quick: bool, against: Path | None, only: list[str] | None, processor: bool, turns: int) -> None:
     """Measure, print and write."""
     result = check_writable(out / "first_answers.json")
     homes = versions(against)
     names = chosen(TASKS, only)
+    for home in homes.values():
+        compileall.compile_dir(home / "reojax", quiet=1)
+    least = statistics.median if processor else min
     rows = []
     print("| first answer [s] | " + " | ".join(f"{home}, no cache | kept programs" for home in homes) + " |")
     print("|---|" + "--:|" * 2 * len(homes))
     for name in names:
         taken: dict[str, list[tuple[float, float]]] = {home: [] for home in homes}
-        for _ in range(1 if quick else 3):
+        for _ in range(1 if quick else turns):
             for home, place in homes.items():
                 with tempfile.TemporaryDirectory() as folder:
-                    taken[home].append((_seconds(name, place, folder), _seconds(name, place, folder)))
-        least = {home: [min(times) for times in zip(*runs, strict=True)] for home, runs in taken.items()}
-        print(f"| {name} | " + " | ".join(f"{seconds:.2f}" for pair in least.values() for seconds in pair) + " |")
-        rows.append({"what": name, "seconds": least, "all": taken})
-    write_json(result, {"machine": machine(), "rows": rows})
+                    first, then = (_seconds(name, place, folder)[processor] for _ in range(2))
+                    taken[home].append((first, then))
+        told = {home: [least(times) for times in zip(*runs, strict=True)] for home, runs in taken.items()}
+        print(f"| {name} | " + " | ".join(f"{seconds:.2f}" for pair in told.values() for seconds in pair) + " |")
+        rows.append({"what": name, "seconds": told, "all": taken})
+    write_json(result, {"machine": machine(), "processor time": processor, "rows": rows})
     say(f"wrote {result}")
 
 
-def _seconds(name: str, home: Path, folder: str) -> float:
+def _seconds(name: str, home: Path, folder: str) -> tuple[float, float]:
+    """What a process takes by the clock, and of the processor."""
     environment = {**os.environ, "PYTHONPATH": str(home), "XDG_CACHE_HOME": folder, "REOJAX_CACHE": "1"}
     environment.pop("JAX_COMPILATION_CACHE_DIR", None)
-    begin = time.perf_counter()
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    begin, before = time.perf_counter(), _processor_seconds()
     subprocess.run([sys.executable, *TASKS[name]], env=environment, capture_output=True, check=True, cwd=home)
-    return time.perf_counter() - begin
+    return time.perf_counter() - begin, _processor_seconds() - before
+
+
+def _processor_seconds() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 if __name__ == "__main__":
-    run(main, comparison_options(__doc__))
+    parser = comparison_options(__doc__)
+    parser.add_argument("--processor", action="store_true", help="medians of processor time")
+    parser.add_argument("--turns", type=int, default=3, help="how often each runs [%(default)d]")
+    run(main, parser)

@@ -13,7 +13,7 @@ import jax
 import jaxlib
 from jax.experimental.compilation_cache.compilation_cache import reset_cache
 
-from reojax._internal import checks
+from reojax._internal import checks, kept
 
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # malloc.h
 CACHE_BYTES = 2**30
@@ -50,7 +50,7 @@ def start() -> None:
     jax.config.update("jax_enable_x64", True)
     hold_memory()
     with suppress(ValueError):  # no home, no permission, a file in the way
-        cache()
+        kept.keep_in(_own(cache()))
 
 
 def cache(folder: str | os.PathLike[str] | None = None, *, limit: int = CACHE_BYTES) -> CompilationCache:
@@ -87,6 +87,11 @@ def cache(folder: str | os.PathLike[str] | None = None, *, limit: int = CACHE_BY
     return CompilationCache(place, *_content(place), limit)
 
 
+def _own(found: CompilationCache) -> Path | None:
+    """A folder of programs that is reojax's own, and none that JAX has been told of: it is bounded."""
+    return None if found.limit is None else found.folder
+
+
 def _usable(folder: str | os.PathLike[str] | None) -> Path:
     try:
         place = cache_folder() if folder is None else Path(folder).expanduser().absolute()
@@ -102,7 +107,7 @@ def _usable(folder: str | os.PathLike[str] | None) -> Path:
 
 def _content(folder: Path) -> tuple[int, int]:
     """Number and size of the programs in a folder."""
-    sizes = [size for name, size, _ in _files(folder) if name.endswith("-cache")]
+    sizes = [size for name, size, _ in _files(folder) if name.endswith(("-cache", kept.SUFFIX))]
     return len(sizes), sum(sizes)
 
 

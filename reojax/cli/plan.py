@@ -79,11 +79,11 @@ def read_target(text: str) -> "np.ndarray":
     Raises:
         ValueError: saying what is wrong with it.
     """
-    import jax
     import numpy as np
 
     from reojax import so3
     from reojax._internal import checks
+    from reojax._internal.kept import Program
     from reojax.session import LEAST_COMPILE
 
     kind, *rest = text.split(None, 1)[:2] or [""]
@@ -103,9 +103,9 @@ def read_target(text: str) -> "np.ndarray":
         length = float(np.linalg.norm(numbers))
         if abs(length - 1) > 1e-3:
             raise ValueError(f"the target {text!r} is no rotation: its length is {length:.6g}, not 1.")
-        return np.asarray(jax.jit(so3.from_quaternion, compiler_options=LEAST_COMPILE)(numbers))
+        return np.asarray(Program(so3.from_quaternion, compiler_options=LEAST_COMPILE)(numbers))
     rotation = {"rotvec": so3.exp, "zxz": so3.from_euler_zxz}[kind]
-    return np.asarray(jax.jit(rotation, compiler_options=LEAST_COMPILE)(np.deg2rad(numbers)))
+    return np.asarray(Program(rotation, compiler_options=LEAST_COMPILE)(np.deg2rad(numbers)))
 
 
 def _read_matrix(name: str) -> "np.ndarray":

@@ -90,21 +90,16 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
     import jax
     import numpy as np
 
-    from reojax import so3
+    from reojax._internal.kept import Program
     from reojax.mechanics.attitude import tilt_and_roll
-    from reojax.mechanics.certificate import DEFAULT_SAMPLES, certify_rotation
+    from reojax.mechanics.certificate import DEFAULT_SAMPLES
     from reojax.mechanics.holonomy import DEFAULT_STEPS, refinement
     from reojax.session import LEAST_COMPILE
 
     finer = refinement(float(np.abs(np.diff(path.waypoints, axis=0)).max()))
     steps, samples = finer * DEFAULT_STEPS, finer * DEFAULT_SAMPLES
-
-    @partial(jax.jit, compiler_options=LEAST_COMPILE)
-    def compute(path: "Path") -> tuple[Any, ...]:  # one program to compile; the robot is constant in it
-        certificate, rotation, history = certify_rotation(robot, path, steps=steps, samples=samples)
-        read = (so3.log, so3.to_euler_zxz, so3.angle, so3.to_quaternion)
-        return certificate, history, rotation, *(function(rotation) for function in read)
-
+    # one program to compile; the robot is constant in it
+    compute = Program(partial(_figures, robot, steps, samples), compiler_options=LEAST_COMPILE)
     certificate, history, rotation, *parts = jax.tree.map(np.asarray, compute(path))
     vector, euler, angle, quaternion = parts
     roll = tilt_and_roll(history)[-1, 2]
@@ -137,6 +132,16 @@ def _report(robot: "Robot", path: "Path", args: argparse.Namespace) -> tuple[dic
         "page": args.html,
     }
     return report, history
+
+
+def _figures(robot: "Robot", steps: int, samples: int, path: "Path") -> tuple[Any, ...]:
+    """Certificate, history of rotations, the net rotation, and what it is as a vector, angles and a quaternion."""
+    from reojax import so3
+    from reojax.mechanics.certificate import certify_rotation
+
+    certificate, rotation, history = certify_rotation(robot, path, steps=steps, samples=samples)
+    read = (so3.log, so3.to_euler_zxz, so3.angle, so3.to_quaternion)
+    return certificate, history, rotation, *(function(rotation) for function in read)
 
 
 def _text(report: dict[str, Any], args: argparse.Namespace) -> str:

@@ -69,7 +69,7 @@ class Candidates(NamedTuple):
 
 def context(robot: Robot, layout: Layout, box: AmplitudeBox) -> Context:
     """Compute what all plans of a robot within a box share."""
-    table = jax.tree.map(jax.numpy.asarray, tabulate(robot, layout, box))
+    table = jax.device_put(tabulate(robot, layout, box))
     return Context(robot, layout, box, table, GuessTable(table, box), fold_rotation(robot, layout))
 
 

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
 from reojax._internal.arrays import Array
+from reojax._internal.kept import Program
 from reojax.planning.residual import Miss, Word, chain, dual, miss, pull, step
 from reojax.planning.table import Table, read
 from reojax.session import LEAN_COMPILE, SEARCH_COMPILE
@@ -39,7 +40,7 @@ class Iterate(NamedTuple):
     """Whether more steps may bring it to the target."""
 
 
-@partial(jax.jit, compiler_options=SEARCH_COMPILE)
+@partial(Program, compiler_options=SEARCH_COMPILE)
 def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Iterate:
     """Bring words to their targets by Levenberg-Marquardt steps, clipped to the box."""
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
@@ -69,7 +70,7 @@ def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Iterate:
     return Iterate(x, at.square, (at.square > _SOLVED) & (alone | (at.square < _STALLED * before[1])))
 
 
-@partial(jax.jit, static_argnums=4, compiler_options=LEAN_COMPILE)
+@partial(Program, static_argnums=(4,), compiler_options=LEAN_COMPILE)
 def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], steps: int = 20) -> Iterate:
     """Move solved words along their solutions to less travel, `sum(price |x|)`, each amplitude keeping its sign."""
     sign = jnp.where(x < 0, -1.0, 1.0).astype(x.dtype)
@@ -105,7 +106,7 @@ def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], st
     return Iterate(x, at.square, at.square < 0)
 
 
-@partial(jax.jit, compiler_options=LEAN_COMPILE)
+@partial(Program, compiler_options=LEAN_COMPILE)
 def refine(
     table: Table, word: Word, x: Array, true: Float[Array, "4 k m"], strength: Float[Array, " m"]
 ) -> tuple[Array, Array]:

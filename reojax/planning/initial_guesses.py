@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from reojax._internal.kept import Program
 from reojax.planning import quaternions
 from reojax.planning.table import Table, read
 from reojax.planning.words import AmplitudeBox
@@ -26,7 +26,7 @@ FIRST = 3
 _CANDIDATES, _CHOICE = 250, 3
 """Words among which the others are chosen: so many, or so many times as many as are chosen."""
 
-_read = jax.jit(read, compiler_options=LEAST_COMPILE)
+_read = Program(read, compiler_options=LEAST_COMPILE)
 
 
 class Starts(NamedTuple):

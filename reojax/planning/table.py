@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Float
 
 from reojax._internal.arrays import Array
+from reojax._internal.kept import Program
 from reojax.manoeuvres import Layout, fold_angles
 from reojax.mechanics._fast.parameters import Pattern, pattern_of
 from reojax.mechanics.holonomy import DEFAULT_STEPS, _net_rotation, net_rotation, refinement
@@ -55,7 +56,7 @@ def true_rotations(robot: Robot, layout: Layout, amplitudes: Float[np.ndarray, "
     return quaternions.from_matrices(np.concatenate([np.zeros((0, 3, 3)), *turned])[:count])
 
 
-@partial(jax.jit, static_argnums=(2, 3))
+@partial(Program, static_argnums=(2, 3))
 def _net_rotations(robot: Robot, corners: Array, steps: int, pattern: Pattern) -> Array:
     return jax.vmap(lambda corners: _net_rotation(robot, corners, steps, pattern))(corners)
 
