@@ -5,9 +5,9 @@
     taskset -c 0 python benchmarks/first_answers.py --processor --turns 5   # on one core, by its time
 
 Every command and script runs in a process of its own, start of Python included, by the clock: first with an empty cache
-of compiled programs, then with what that run has left there. The least of the turns, or with `--processor` the median of
-the processor time. Python's own byte code is there beforehand, as where reojax is installed. `--only TEXT ...` takes the
-rows whose names contain one. Writes first_answers.json.
+of compiled programs, then with what that run has left there. The least of the turns, or with `--processor` the median
+of the processor time. Python's own byte code is there beforehand, as where reojax is installed. `--only TEXT ...` takes
+the rows whose names contain one. Writes first_answers.json.
 """
 
 import compileall

@@ -24,6 +24,7 @@ import numpy as np
 from jax.experimental import serialize_executable
 from jax.experimental.compilation_cache.compilation_cache import reset_cache
 
+from reojax._internal.arrays import is_concrete
 from reojax._internal.files import replacing
 
 SUFFIX = ".program"
@@ -63,7 +64,7 @@ class Program:
         """What the function gives."""
         traced = [a for number, a in enumerate(arguments) if number not in self._static]
         leaves, tree = jax.tree.flatten(traced)
-        if _folder is None or any(isinstance(leaf, jax.core.Tracer) for leaf in leaves) or not _simple():
+        if _folder is None or not is_concrete(traced) or not _simple():
             return self._jit(*arguments)
         static = tuple(a for number, a in enumerate(arguments) if number in self._static)
         key = tree, tuple(map(jax.typeof, leaves)), static
@@ -151,4 +152,4 @@ def _versions() -> tuple[Any, ...]:
     processor = [platform.machine(), platform.processor(), cores]
     with suppress(OSError), open("/proc/cpuinfo") as file:
         processor += [line for line in iter(file.readline, "\n") if line.startswith(("model", "flags", "Features"))]
-    return platform.python_version(), np.__version__, jax.__version__, jaxlib.__version__, source.digest(), processor
+    return platform.python_version(), np.__version__, jax.__version__, jaxlib.version.__version__, source.digest(), processor
