@@ -56,7 +56,8 @@ class Program:
         if "<" in self._function.__qualname__:
             raise ValueError(f"{self._function.__qualname__} is no function of a module: its name does not tell it.")
         functools.update_wrapper(self, self._function)
-        self._jit = jax.jit(function, static_argnums=static_argnums, **options)
+        # a function of its own, so that JAX has no program of it in memory that it has read from its store
+        self._jit = jax.jit(functools.partial(function), static_argnums=static_argnums, **options)
         self._options, self._static = options, static_argnums
         self._programs: dict[Any, Callable[..., Any]] = {}
 
@@ -152,4 +153,5 @@ def _versions() -> tuple[Any, ...]:
     processor = [platform.machine(), platform.processor(), cores]
     with suppress(OSError), open("/proc/cpuinfo") as file:
         processor += [line for line in iter(file.readline, "\n") if line.startswith(("model", "flags", "Features"))]
-    return platform.python_version(), np.__version__, jax.__version__, jaxlib.version.__version__, source.digest(), processor
+    versions = [platform.python_version(), np.__version__, jax.__version__, jaxlib.version.__version__]
+    return versions, source.digest(), processor
