@@ -35,7 +35,7 @@ from reojax.steering.least_change import Effort
 from reojax.steering.prediction import bias_of
 from reojax.steering.tables import gain_table
 
-_BUMPS = 13
+_BUMPS = 20
 """Bumps at least, where they are not asked for."""
 
 
@@ -51,14 +51,14 @@ def Steering(
     parameters_std: Sequence[float] = (),
     wander: float = 1e-3,
     tau: float = 5e-3,
-    settle: float = 2e-2,
+    settle: float = 1e-2,
     largest: float = 0.6,
     samples: int = 32,
     weights: ArrayLike | None = None,
     left: float = 0.1,
     steps: int = 20,
     bumps: int | None = None,
-    price: float = 3e-3,
+    price: float = 3e-4,
     goal: ArrayLike | None = None,
     clearance: float | None = None,
 ) -> SteeringLaw:
@@ -84,8 +84,8 @@ def Steering(
         left: damping of the linear law, in shares of the authority at the start.
         steps: steps of the prediction of the end by the estimated robot, at each reading; 0 takes the linear law of
             `reojax.steering.onboard` instead, which is cheaper and holds for small errors.
-        bumps: smooth changes in time of which, for each joint, a correction is made; default three a piece, at least
-            13.
+        bumps: smooth changes in time of which, for each joint, a correction is made; default five a piece, at least
+            20. The more there are, the later something can still be taken back, and the faster the joints go.
         price: square of an error that is worth a change of a joint by a radian [rad^2]: the more, the smaller the
             changes, and the slower they follow what is estimated.
         goal: (3, 3) orientation to end in, the base starting at the identity; default where the motion ends.
@@ -123,7 +123,7 @@ def Steering(
         raise ValueError(f"standard deviations must be finite and not negative; they are {std[3:].tolist()}.")
     keep = None if clearance is None else keep_of(robot, trajectory, clearance)
     steps = checks.whole("steps", steps, 0)
-    bumps = max(_BUMPS, 3 * trajectory.pieces + 1) if bumps is None else checks.whole("bumps", bumps)
+    bumps = max(_BUMPS, 5 * trajectory.pieces) if bumps is None else checks.whole("bumps", bumps)
     aim = gains.rotation[-1] if goal is None else checks.rotations("goal", goal)
     dtype = common_float(robot, trajectory)
     one = partial(jnp.asarray, dtype=dtype)
