@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from reojax.manoeuvres import Layout
-from reojax.planning.gauss_newton import Iterate, refine, shorten, solve
+from reojax.planning.gauss_newton import FEW, MANY, Iterate, Programs
 from reojax.planning.initial_guesses import GuessTable, Starts
 from reojax.planning.residual import Word
 from reojax.planning.table import Table, fold_rotation, tabulate, true_rotations
@@ -20,10 +20,16 @@ _ROWS = 256
 """Rows per call."""
 SIZES = (2, 4, 6)
 """Numbers of slots that there are programs for."""
+_FEW, _FEW_ROWS = 8, 64
+"""Up to so many targets, calls are of so few rows and all of them of the most slots: what counts is compilation."""
 _BURSTS = (6, 10)
 """Steps on the table."""
+_ENOUGH, _THOROUGH = 8, 20
+"""Steps to less travel: what takes four fifths of what there is to gain, and where time does not count."""
 _NEWTON = 12
 """Steps on the true rotations."""
+_FINE = 1e-10
+"""Tolerance [rad] below which the default steps of integration, good to some 1e-11, are not enough."""
 _SHORT = 1e-6
 """Largest change of amplitudes [rad] of a step that, from within the tolerance, is not looked at where it ends."""
 _SOFTEST = 1e-10
@@ -87,22 +93,28 @@ def travel(box: AmplitudeBox, rows: Candidates) -> np.ndarray:
 def attempt(context: Context, targets: np.ndarray, rows: Candidates, bursts: int = len(_BURSTS)) -> Candidates:
     """Solve rows on the table; after some steps only those go on that still come nearer."""
     found, going = rows._replace(x=rows.x.copy(), square=rows.square.copy()), np.arange(len(rows.owner))
+    program = _programs(targets).solve
     for steps in _BURSTS[:bursts]:
         if not len(going):
             break
         x, square, more = _on_table(
-            context, targets, found.take(going), lambda word, x, _, steps=steps: solve(context.table, word, x, steps)
+            context, targets, found.take(going), lambda word, x, _, steps=steps: program(context.table, word, x, steps)
         )
         found.x[..., going], found.square[going] = x, square
         going = going[more]
     return found
 
 
-def shorten_candidates(context: Context, targets: np.ndarray, rows: Candidates) -> Candidates:
-    """Less travel for solved rows, on the table."""
+def shorten_candidates(
+    context: Context, targets: np.ndarray, rows: Candidates, *, thorough: bool = False
+) -> Candidates:
+    """Less travel for solved rows, on the table; of few targets thoroughly in any case."""
     if not len(rows.owner):
         return rows
-    x, square, _ = _on_table(context, targets, rows, lambda word, x, price: shorten(context.table, word, x, price))
+    program, steps = _programs(targets).shorten, _THOROUGH if thorough or _are_few(targets) else _ENOUGH
+    x, square, _ = _on_table(
+        context, targets, rows, lambda word, x, price: program(context.table, word, x, price, steps)
+    )
     return rows._replace(x=x, square=square)
 
 
@@ -111,11 +123,12 @@ def settle(context: Context, targets: np.ndarray, rows: Candidates, tolerance: f
     best = rows._replace(x=rows.x.copy(), square=np.full(rows.square.shape, np.inf))  # its own arrays
     x, strength = rows.x.copy(), np.full(rows.square.shape, _SOFTEST)
     going = np.arange(len(rows.owner))
+    accuracy = 2 if _are_few(targets) or tolerance < _FINE else 1  # what is compiled for `plans` serves few
     for _ in range(_NEWTON):
         if not len(going):
             break
         at = rows._replace(x=x).take(going)
-        square, moved = _true_step(context, targets, at, strength[going])
+        square, moved = _true_step(context, targets, at, strength[going], accuracy)
         better = square < best.square[going]
         best.square[going] = np.where(better, square, best.square[going])
         best.x[..., going] = np.where(better, at.x, best.x[..., going])
@@ -129,21 +142,25 @@ def settle(context: Context, targets: np.ndarray, rows: Candidates, tolerance: f
 
 
 def _true_step(
-    context: Context, targets: np.ndarray, rows: Candidates, strength: np.ndarray
+    context: Context, targets: np.ndarray, rows: Candidates, strength: np.ndarray, accuracy: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Squared residuals on the true rotations, and amplitudes after one step."""
+    """Squared residuals on the true rotations, by `accuracy` times the default steps, and amplitudes after one step."""
     used = rows.letter >= 0
     last = last_twist(context.box.letters, rows.letter, rows.x)
     true = np.zeros((4, *used.shape))
     true[0] = 1
-    true[:, used] = true_rotations(context.robot, context.layout, np.stack([rows.x[0], rows.x[1], last])[:, used])
-    squares, moved = [], []
-    for word, x, size, part in _chunks(context, targets, rows):
-        known = _pad(true[..., part], _ROWS, 1.0), _pad(strength[part], _ROWS, 1.0)
-        square, x = refine(context.table, word, x, *known)
-        squares.append(np.asarray(square)[:size])
-        moved.append(np.asarray(x)[..., :size])
-    return np.concatenate(squares), np.concatenate(moved, axis=-1)
+    amplitudes = np.stack([rows.x[0], rows.x[1], last])[:, used]
+    true[:, used] = true_rotations(context.robot, context.layout, amplitudes, accuracy)
+
+    program = _programs(targets).refine
+
+    def step(word: Word, x: np.ndarray, part: slice) -> tuple[np.ndarray, ...]:
+        known, soft = _pad(true[..., part], word.letter.shape, 0.0), _pad(strength[part], x.shape[-1:], 1.0)
+        known[0, word.letter < 0] = 1.0
+        return program(context.table, word, x, known, soft)
+
+    moved, square = _in_chunks(context, targets, rows, step)
+    return square, moved
 
 
 def starting_rows(owner: np.ndarray, starts: Starts) -> Candidates:
@@ -168,34 +185,60 @@ def rank_in_target(owner: np.ndarray) -> np.ndarray:
     return np.arange(len(owner)) - np.searchsorted(owner, owner)
 
 
+def _are_few(targets: np.ndarray) -> bool:
+    return targets.shape[1] <= _FEW
+
+
+def _programs(targets: np.ndarray) -> Programs:
+    return FEW if _are_few(targets) else MANY
+
+
 def _on_table(context: Context, targets: np.ndarray, rows: Candidates, program: Callable[..., Iterate]) -> Iterate:
-    def run(chunk: tuple[Word, np.ndarray, int, slice]) -> list[np.ndarray]:
-        word, x, size, _ = chunk
-        costs = price(context.box, np.asarray(word.letter), np.asarray(word.runs))
+    prices = price(context.box, rows.letter, rows.runs)
+
+    def run(word: Word, x: np.ndarray, part: slice) -> Iterate:
+        return program(word, x, _pad(prices[..., part], x.shape[1:], 0.0))
+
+    return Iterate(*_in_chunks(context, targets, rows, run))
+
+
+def _in_chunks(
+    context: Context, targets: np.ndarray, rows: Candidates, program: Callable[[Word, np.ndarray, slice], Sequence]
+) -> list[np.ndarray]:
+    """Arrays of all rows by a program of some; amplitudes are the first of them."""
+    slots = rows.letter.shape[0]
+
+    def run(chunk: tuple[Word, np.ndarray, slice]) -> list[np.ndarray]:
         with jax.enable_x64(True):  # a thread of its own starts with JAX's default
-            return [np.asarray(field)[..., :size] for field in program(word, x, costs)]
+            x, *rest = (np.asarray(field) for field in program(*chunk))
+        size = len(rows.owner[chunk[2]])
+        return [x[:, :slots, :size], *(field[..., :size] for field in rest)]
 
     with ThreadPoolExecutor(usable_cores()) as pool:
         results = list(pool.map(run, _chunks(context, targets, rows)))
-    return Iterate(*(np.concatenate(field, axis=-1) for field in zip(*results, strict=True)))
+    return [np.concatenate(field, axis=-1) for field in zip(*results, strict=True)]
 
 
-def _chunks(context: Context, targets: np.ndarray, rows: Candidates) -> Iterator[tuple[Word, np.ndarray, int, slice]]:
-    """Words of `_ROWS` rows each; what is added to fill them is solved already."""
-    box = context.box
-    for first in range(0, len(rows.owner), _ROWS):
-        part = slice(first, first + _ROWS)
-        letter = _pad(rows.letter[:, part], _ROWS, -1)
-        size = min(_ROWS, len(rows.owner) - first)
-        low, high = (np.moveaxis(np.where((letter >= 0)[..., None], edge[letter], 0.0), -1, 0) for edge in box[1:])
-        target = _pad(targets[:, rows.owner[part]], _ROWS, 0.0)
-        target[0, size:] = 1.0
-        word = Word(letter, _pad(rows.runs[:, part], _ROWS, 1.0), target, low, high)
-        yield word, _pad(rows.x[..., part], _ROWS, 0.0), size, part
+def _chunks(context: Context, targets: np.ndarray, rows: Candidates) -> Iterator[tuple[Word, np.ndarray, slice]]:
+    """Words of one number of rows each, and which rows they are; what is added to fill them is solved already."""
+    shape = (SIZES[-1], _FEW_ROWS) if _are_few(targets) else (rows.letter.shape[0], _ROWS)
+    once = (rows.runs == 1).all()
+    for first in range(0, len(rows.owner), shape[1]):
+        part = slice(first, first + shape[1])
+        letter = _pad(rows.letter[:, part], shape, -1)
+        low, high = (
+            np.moveaxis(np.where((letter >= 0)[..., None], edge[letter], 0.0), -1, 0) for edge in context.box[1:]
+        )
+        target = _pad(targets[:, rows.owner[part]], shape[1:], 0.0)
+        target[0, len(rows.owner[part]) :] = 1.0
+        word = Word(letter, None if once else _pad(rows.runs[:, part], shape, 1.0), target, low, high)
+        yield word, _pad(rows.x[..., part], shape, 0.0), part
 
 
-def _pad(array: np.ndarray, size: int, value: float) -> np.ndarray:
-    width = [(0, 0)] * (array.ndim - 1) + [(0, size - array.shape[-1])]
+def _pad(array: np.ndarray, shape: tuple[int, ...], value: float) -> np.ndarray:
+    """Fill up the last axes to `shape`."""
+    same = array.ndim - len(shape)
+    width = [(0, 0)] * same + [(0, size - have) for size, have in zip(shape, array.shape[same:], strict=True)]
     return np.pad(array, width, constant_values=value)
 
 

@@ -15,6 +15,7 @@ from reojax.planning.candidates import (
     Candidates,
     Context,
     attempt,
+    join,
     least,
     settle,
     shorten_candidates,
@@ -34,17 +35,19 @@ _ROUNDS = (("bent", 0, FIRST), ("bent", FIRST, 10), ("near", 0, FIRST), ("bent",
 _LAST_FEW_ROUNDS = (*_FEW_ROUNDS, ("near", 40, 240))
 _LAST_ROUNDS = (("bent", 0, FIRST), ("bent", FIRST, 10), ("bent", 10, 40), ("bent", 40, 100))
 """Starts for what is not reached with the longest word that is allowed, however far off the others ended."""
-_HOPE = 0.1
-"""Squared residual [rad^2] that some start must come down to for another round."""
-_FAR = {1: 0.06, 2: 0.1, 3: 0.15}
+_HOPE = {1: 0.01, 2: 0.01, 3: 0.01}
+"""Squared residual [rad^2] that some start must come down to for another round; longer words: `_HOPE_LONG`."""
+_HOPE_LONG = 0.1
+_FAR = {1: 0.06, 2: 0.07, 3: 0.15}
 """Chord to the nearest start beyond which a word of so many loops is not tried; longer words: `_FAR_LONG`."""
 _FAR_LONG = 0.25
 _CLOSE = 1e-9
 """Squared residual on the table [rad^2] from which the true rotations are tried."""
 _CLOSE_FEW = {1: 1e-5, 2: 1e-6}
 """The same for words of so few loops that they barely reach a target or do not, which the table cannot tell apart."""
-_NEAR, _PATIENCE = 1e-4, 6
-"""Squared residual on the table up to which such words are tried on, and how often."""
+_NEAR, _SLOW, _PATIENCE = 1e-4, 0.9, 6
+"""Squared residual on the table up to which such words are tried on, what part of it each try must leave for another
+one, and how many there are."""
 _EXACT = 1e-13
 """Squared residual on the table that leaves no doubt."""
 _AGAIN = 4
@@ -101,14 +104,21 @@ def _with_loops(scene: Context, targets: np.ndarray, answer: BestWords, slots: i
     waiting = np.flatnonzero(~answer.solved)
     if len(waiting):
         waiting = waiting[scene.pool.reaches(targets[:, waiting], slots, _FAR.get(slots, _FAR_LONG))]
-    closest = np.zeros(len(waiting))
-    for kind, first, last in _FEW_ROUNDS if slots in _CLOSE_FEW else _ROUNDS:
-        trying = np.flatnonzero(~answer.solved[waiting] & (closest < _HOPE))
-        if not len(trying):
-            break
-        starts = getattr(scene.pool, kind)(targets[:, waiting[trying]], slots, last)
-        found = _try(scene, targets, answer, slots, waiting[trying], starts, first)
-        closest[trying] = found.square.reshape(-1, last - first).min(1)
+    closest, hope = np.zeros(len(waiting)), _HOPE.get(slots, _HOPE_LONG)
+    rounds = _FEW_ROUNDS if slots in _CLOSE_FEW else _ROUNDS
+    # the first starts, which mostly succeed, are settled first; the others together
+    for some in (rounds[:1], rounds[1:]):
+        parts, on_target = [], answer.solved[waiting]
+        for kind, first, last in some:
+            trying = np.flatnonzero(~on_target & (closest < hope))
+            if not len(trying):
+                break
+            starts = getattr(scene.pool, kind)(targets[:, waiting[trying]], slots, last)
+            parts.append(_solve_starts(scene, targets, waiting[trying], starts, first))
+            closest[trying] = parts[-1].square.reshape(-1, last - first).min(1)
+            on_target[trying] = closest[trying] < _CLOSE
+        if parts:
+            _update(scene, targets, answer, join(parts), 1, _CLOSE_FEW.get(slots, _CLOSE))
 
 
 def _with_what_is_left(scene: Context, targets: np.ndarray, answer: BestWords, slots: int, most: int) -> None:
@@ -119,23 +129,19 @@ def _with_what_is_left(scene: Context, targets: np.ndarray, answer: BestWords, s
         if not len(waiting):
             return
         starts = getattr(scene.pool, kind)(targets[:, waiting], slots, last)
-        known.append(_try(scene, targets, answer, slots, waiting, starts, first))
+        known.append(_solve_starts(scene, targets, waiting, starts, first))
+        _update(scene, targets, answer, known[-1], 1, _CLOSE_FEW.get(slots, _CLOSE))
     waiting = np.flatnonzero(~answer.solved)
     if len(waiting):
         known = [part.take(np.isin(part.owner, waiting)) for part in known]
         _update(scene, targets, answer, vary(scene, targets, [answer.rows.take(waiting), *known], slots, most), 4)
 
 
-def _try(
-    scene: Context, targets: np.ndarray, answer: BestWords, slots: int, owner: np.ndarray, starts: Starts, first: int
-) -> Candidates:
-    """Solve the starts from the `first` one for the targets `owner`, and take the best."""
+def _solve_starts(scene: Context, targets: np.ndarray, owner: np.ndarray, starts: Starts, first: int) -> Candidates:
+    """Solve the starts from the `first` one for the targets `owner`, on the table."""
     some = Starts(*(field[..., first:] for field in starts))
     found = attempt(scene, targets, starting_rows(owner, some))
-    if slots in _CLOSE_FEW:
-        found = _continue_search(scene, targets, found)
-    _update(scene, targets, answer, found, 1, _CLOSE_FEW.get(slots, _CLOSE))
-    return found
+    return _continue_search(scene, targets, found) if len(some.letter) in _CLOSE_FEW else found
 
 
 def _update(
@@ -150,10 +156,11 @@ def _update(
 def _continue_search(scene: Context, targets: np.ndarray, found: Candidates) -> Candidates:
     """Go on with what comes near a target slowly, as words do that barely reach it."""
     found = found._replace(x=found.x.copy(), square=found.square.copy())
+    near = np.flatnonzero((found.square > _EXACT) & (found.square < _NEAR))
     for _ in range(_PATIENCE):
-        near = np.flatnonzero((found.square > _EXACT) & (found.square < _NEAR))
-        then = attempt(scene, targets, found.take(near))
+        then, before = attempt(scene, targets, found.take(near)), found.square[near]
         found.x[..., near], found.square[near] = then.x, then.square
+        near = near[(then.square > _EXACT) & (then.square < _SLOW * before)]
     return found
 
 
@@ -181,7 +188,7 @@ def _with_small_loops(
     answer.update_best(least(missed, missed.square))
     found = found.take(found.square < _CLOSE)
     best = least(found, value(found) + np.where(found.square > _EXACT, 1e6, 0.0), _AGAIN)
-    short = settle(scene, targets, shorten_candidates(scene, targets, best), answer.tolerance)
+    short = settle(scene, targets, shorten_candidates(scene, targets, best, thorough=True), answer.tolerance)
     plain = settle(scene, targets, best, answer.tolerance)
     for rows in (short, plain):
         off = np.where(rows.square <= answer.tolerance**2, 0.0, 1e9)
@@ -193,7 +200,7 @@ def _update_from_solutions(
 ) -> None:
     """Shorten what reaches the target on the table, and solve it on the true rotations."""
     value = travel(scene.box, found) + np.where(found.square > _EXACT, 1e3, 0.0)
-    short = shorten_candidates(scene, targets, least(found, value, keep))
+    short = shorten_candidates(scene, targets, least(found, value, keep), thorough=keep > 1)
     answer.update_best(settle(scene, targets, least(short, travel(scene.box, short)), answer.tolerance))
     lost = ~answer.solved[found.owner]  # at the edge of what can be reached, where the table is not enough
     again = settle(scene, targets, least(found.take(lost), found.square[lost], _AGAIN), answer.tolerance)

@@ -1,14 +1,13 @@
 """Solving words for targets: damped Gauss-Newton within the box, then less travel along the solutions.
 
-Both run on the table, on many rows at once, one program per number of slots. Nothing here raises: what is not
-solved says so by its residual.
+Both run on the table, on many rows at once, one program per number of slots (`MANY`, `FEW`). Nothing here raises: what
+is not solved says so by its residual.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,7 +17,7 @@ from reojax._internal.arrays import Array
 from reojax._internal.kept import Program
 from reojax.planning.residual import Miss, Word, chain, dual, miss, pull, step
 from reojax.planning.table import Table, read
-from reojax.session import LEAN_COMPILE, SEARCH_COMPILE
+from reojax.session import LEAN_COMPILE, LEAST_COMPILE, SEARCH_COMPILE
 
 _SOLVED = 1e-14
 """Squared residual [rad^2] at which the search on the table stops; the true rotations take over."""
@@ -40,7 +39,6 @@ class Iterate(NamedTuple):
     """Whether more steps may bring it to the target."""
 
 
-@partial(Program, compiler_options=SEARCH_COMPILE)
 def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Iterate:
     """Bring words to their targets by Levenberg-Marquardt steps, clipped to the box."""
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
@@ -70,8 +68,7 @@ def solve(table: Table, word: Word, x: Array, steps: int | Array) -> Iterate:
     return Iterate(x, at.square, (at.square > _SOLVED) & (alone | (at.square < _STALLED * before[1])))
 
 
-@partial(Program, static_argnums=(4,), compiler_options=LEAN_COMPILE)
-def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], steps: int = 20) -> Iterate:
+def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], steps: int | Array) -> Iterate:
     """Move solved words along their solutions to less travel, `sum(price |x|)`, each amplitude keeping its sign."""
     sign = jnp.where(x < 0, -1.0, 1.0).astype(x.dtype)
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
@@ -106,11 +103,10 @@ def shorten(table: Table, word: Word, x: Array, price: Float[Array, "d k m"], st
     return Iterate(x, at.square, at.square < 0)
 
 
-@partial(Program, compiler_options=LEAN_COMPILE)
 def refine(
     table: Table, word: Word, x: Array, true: Float[Array, "4 k m"], strength: Float[Array, " m"]
 ) -> tuple[Array, Array]:
-    """Residuals with the `true` rotations of the loops, and amplitudes after a step from them, damped by `strength`.
+    """Amplitudes after a step from the `true` rotations of the loops, damped by `strength`, and residuals before it.
 
     The derivatives are those of the table, good to some 1e-5, so that each step takes about five digits off.
     """
@@ -120,7 +116,7 @@ def refine(
     used = jnp.broadcast_to((word.letter >= 0)[None], x.shape)
     damping = strength * (at.jacobian**2).sum((0, 1, 2))
     dx = _up_to_the_edge(x, word, used, lambda free, held: step(at, free, held, damping))
-    return at.square, jnp.clip(x + dx, word.low, word.high)
+    return jnp.clip(x + dx, word.low, word.high), at.square
 
 
 def _inside(x: Array, word: Word, used: Array, direction: Callable[[Array, Array], Array]) -> Array:
@@ -166,3 +162,22 @@ def _nothing(x: Array) -> Miss:
 
 def _choose(better: Array, then: Miss, at: Miss) -> Miss:
     return jax.tree.map(lambda a, b: jnp.where(better.reshape(*(1,) * (a.ndim - 1), -1), a, b), then, at)
+
+
+class Programs(NamedTuple):
+    """What is compiled: the functions of this file."""
+
+    solve: Callable[..., Iterate]
+    shorten: Callable[..., Iterate]
+    refine: Callable[..., tuple[Array, Array]]
+
+
+def _compiled(*options: dict[str, Any]) -> Programs:
+    functions = zip((solve, shorten, refine), options, strict=True)
+    return Programs(*(Program(function, compiler_options=chosen) for function, chosen in functions))
+
+
+MANY = _compiled(SEARCH_COMPILE, SEARCH_COMPILE, LEAN_COMPILE)
+"""For many targets: what runs often is fast."""
+FEW = _compiled(LEAN_COMPILE, LEAN_COMPILE, LEAST_COMPILE)
+"""For few: what is run a few times compiles quickly."""

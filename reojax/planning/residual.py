@@ -24,8 +24,8 @@ class Word(NamedTuple):
 
     letter: Int[Array, "k m"]
     """Letters; -1 for a slot that is not used."""
-    runs: Float[Array, "k m"]
-    """How many times over each loop is run."""
+    runs: Float[Array, "k m"] | None
+    """How many times over each loop is run; None: once, which needs no powers."""
     target: Float[Array, "4 m"]
     """Rotations to reach, quaternions, between the folded ends of the word."""
     low: Float[Array, "d k m"]
@@ -53,26 +53,31 @@ def miss(table: Table, word: Word, x: Float[Array, "d k m"]) -> Miss:
 
 def chain(word: Word, q: Float[Array, "4 k m"], dq: Float[Array, "d 4 k m"]) -> Miss:
     """Put the loops' quaternions and their derivatives together."""
-    # of the powers M^n: what stands before each in the product, and what after it
-    q, dq = jax.lax.optimization_barrier(_powers(word.runs, q, dq))  # once, not again for every product
-    rest = jnp.ones_like(word.target[0]), *jnp.zeros_like(word.target[1:])
-
-    def onward(before, q):
-        return product(before, q), before
-
-    def back(after, q):
-        return product(q, after), after
-
-    (w, *v), left = jax.lax.scan(onward, inverse(tuple(word.target)), tuple(q))
-    _, right = jax.lax.scan(back, rest, tuple(q), reverse=True)
+    if word.runs is not None:
+        q, dq = _powers(word.runs, q, dq)
+    q, dq = jax.lax.optimization_barrier((q, dq))  # once, not again for every product
+    loops = [tuple(q[:, slot]) for slot in range(q.shape[1])]
+    # of each loop M^n: what stands before it in the product, and what after it
+    before = [inverse(tuple(word.target))]
+    for loop in loops:
+        before.append(product(before[-1], loop))
+    w, *v = before.pop()
+    after = [(jnp.ones_like(w), *jnp.zeros_like(q[1:, 0]))]
+    for loop in loops[:0:-1]:
+        after.insert(0, product(loop, after[0]))
     # 2 v of the rotation left, on the side where w > 0
     sign = jnp.where(w < 0, -2.0, 2.0).astype(w.dtype)
     residual = sign[None] * jnp.stack(v)
-    left, right = (tuple(component[None] for component in side) for side in (left, right))
+    left, right = jax.lax.optimization_barrier((_slots(before), _slots(after)))
     # d(before M after) = before dM after
     changes = product(product(left, tuple(dq[:, i] for i in range(4))), right)
     jacobian = sign[None, None, None] * jnp.stack(changes[1:], axis=2)
     return Miss(residual, jacobian, (residual * residual).sum(0))
+
+
+def _slots(side: Sequence[Sequence[Array]]) -> tuple[Array, ...]:
+    """Components (1, k, m) of the quaternions of k slots."""
+    return tuple(jnp.stack(component)[None] for component in zip(*side, strict=True))
 
 
 def _powers(count: Array, q: Array, dq: Array) -> tuple[Array, Array]:
