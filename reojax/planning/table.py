@@ -163,8 +163,8 @@ def read(table: Table, word: Array, x: Array) -> tuple[Array, Array]:
 
 
 def _sum(values: Array, weights: Array, axis: int) -> Array:
-    """Sum `values` (4, 4, ..., rows) over the four nodes along the amplitude `axis`, written out: rows stay side by side,
-    so this takes half the time of a reduction."""
+    """Sum `values` (4, 4, ..., rows) over the four nodes along the amplitude `axis`, written out: rows stay
+    side by side, so that this takes half the time of a reduction."""
     before = 1 + axis  # the quaternion's components, and nodes along other amplitudes
     weights = weights.reshape(4, *(1,) * before, *weights.shape[1:])
     terms = [values[(slice(None),) * before + (node,)] * weights[node] for node in range(4)]
