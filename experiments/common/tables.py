@@ -2,6 +2,7 @@
 
 import importlib.util
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import jax
@@ -13,6 +14,7 @@ from common.types import Array
 from reojax import design, interop, so3
 from reojax.design import Loops, Problem, Solution, Variable
 from reojax.design.outcome import Measure
+from reojax.session import LEAST_COMPILE
 
 TARGET = Variable("target", [-7.0] * 3, [7.0] * 3, "rad")
 """Rotation vector to reach; held, so that one program serves all targets."""
@@ -98,7 +100,7 @@ def gradient_error(robot: reojax.Robot, paths: list[np.ndarray], *, steps: int) 
     padded = np.stack([np.concatenate([p, np.repeat(p[-1:], longest - len(p), axis=0)]) for p in paths])
     directions = np.random.default_rng(0).normal(size=(12, *padded.shape[1:]))
 
-    @jax.jit
+    @partial(jax.jit, compiler_options=LEAST_COMPILE)
     def both(points: Array) -> tuple[Array, Array]:
         nominal = reojax.net_rotation(robot, reojax.polygon(points), steps=steps)
 

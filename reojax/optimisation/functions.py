@@ -19,6 +19,7 @@ from jaxtyping import Float, Int
 
 from reojax._internal.arrays import Array
 from reojax._internal.checks import shorten
+from reojax.session import LEAN_COMPILE
 
 Function = Callable[..., Any]
 BLOCK, _VALUES_BLOCK = 8, 12
@@ -163,7 +164,7 @@ class _Program:
         """The program; what it was made of is let go. Each has a lock of its own, so that two compile at once."""
         with self._lock:
             if self._compiled is None:
-                self._compiled = self._lowered.compile()
+                self._compiled = self._lowered.compile(compiler_options=LEAN_COMPILE)
                 self._lowered = None
             return self._compiled
 

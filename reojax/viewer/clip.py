@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 from jaxtyping import Float
 
 from reojax._internal import checks
+from reojax._internal.arrays import Array
 from reojax.captures.comparison import Comparison
 from reojax.collision.nearest import Nearest, nearest_parts
-from reojax.mechanics.certificate import Certificate, certify_rotation
+from reojax.mechanics.certificate import DEFAULT_SAMPLES, Certificate, certify_rotation
 from reojax.mechanics.holonomy import DEFAULT_STEPS, rotation_history
 from reojax.mechanics.kinematics import link_poses
+from reojax.mechanics.own_units import without_names
 from reojax.motion.simulation import Motion, simulate
 from reojax.motion.trajectory import Trajectory
 from reojax.path import Path, polygon
 from reojax.robot import Robot
+from reojax.session import LEAST_COMPILE
 
 MOST = 1200
 """Most samples of one motion in a page; motions of more are thinned."""
@@ -144,13 +149,16 @@ def _along(robot: Robot, path: Path, entry: str, certified: bool | None) -> Clip
     if not path.edges:
         still = np.broadcast_to(np.eye(3), (2, 3, 3))
         return Clip(np.arange(2.0), np.repeat(corners, 2, axis=0), still, False, np.arange(2.0), travel)
-    if certified or (certified is None and path.edges <= _CERTIFIED):
-        certificate = certify_rotation(robot, path)[0]
-    elif certified is None:
-        notes = (f"The certificate of a path of {path.edges} edges was not measured (ask with certificate=True).",)
     samples = int(np.clip(MOST // path.edges, 1, _PER_EDGE))
-    finer = -(-DEFAULT_STEPS // samples) if path.edges <= MOST else 1
-    history = np.asarray(rotation_history(robot, path, samples=samples * finer))
+    if certified or (certified is None and path.edges <= _CERTIFIED):
+        samples = 1 << (samples.bit_length() - 1)  # of those of the certificate's own motion
+        finer = DEFAULT_SAMPLES // samples
+        certificate, _, history = jax.tree.map(np.asarray, _certified(without_names(robot), path))
+    else:
+        if certified is None:
+            notes = (f"The certificate of a path of {path.edges} edges was not measured (ask with certificate=True).",)
+        finer = -(-DEFAULT_STEPS // samples) if path.edges <= MOST else 1
+        history = np.asarray(rotation_history(robot, path, samples=samples * finer))
     if history.dtype == np.float32:
         notes = (*notes, "Computed in single precision (float32): angles are known to some 1e-6 rad.")
     rotation = history.astype(float)[::finer]
@@ -158,6 +166,12 @@ def _along(robot: Robot, path: Path, entry: str, certified: bool | None) -> Clip
     theta = np.stack([np.interp(clock, np.arange(len(corners)), angle) for angle in corners.T], axis=1)
     clip = Clip(clock, theta, rotation, False, np.arange(len(corners), dtype=float), travel, certificate, notes=notes)
     return _thin(clip, "corners", len(corners))
+
+
+@partial(jax.jit, compiler_options=LEAST_COMPILE)
+def _certified(robot: Robot, path: Path) -> tuple[Certificate, Array, Array]:
+    """Certificate, net rotation and the motion that it is about: one program, which is mostly run once."""
+    return certify_rotation(robot, path)
 
 
 def _by_time(robot: Robot, motion: Any, entry: str, start: float | None = None) -> Clip:
@@ -199,8 +213,6 @@ def _check_joints(robot: Robot, joints: int, entry: str) -> None:
 
 def _check_robot(robot: Robot, motion: Motion, entry: str) -> None:
     """Refuse a motion along which the robot's angular momentum `R (A omega - B theta_dot)` would not keep."""
-    import jax
-
     from reojax.mechanics.momentum import momentum_matrices
 
     every = np.unique(np.linspace(0, len(motion.time) - 1, 64).astype(int))
