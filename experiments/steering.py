@@ -10,8 +10,8 @@ one radian wider than the manoeuvre's amplitudes. "Everything wrong": inertias o
 dropped. Three ways: the motion as planned; the gains' law of the controller alone (`reojax.steering.onboard`); and
 `Steering`, which estimates the links' inertias too where everything is wrong.
 
-Expected: open loop ends 4 degrees off in the median, `Steering` 0.3 (0.7 at the 95th percentile), with all that is
-wrong 1 (4).
+Expected: open loop ends 4 degrees off in the median, `Steering` 0.2 (0.4 at the 95th percentile), with all that is
+wrong 0.5 (2.3).
 """
 
 import time
