@@ -20,7 +20,7 @@ _ROWS = 256
 """Rows per call."""
 SIZES = (2, 4, 6)
 """Numbers of slots that there are programs for."""
-_FEW, _FEW_ROWS = 8, 64
+_FEW, _FEW_ROWS = 64, 64
 """Up to so many targets, calls are of so few rows and all of them of the most slots: what counts is compilation."""
 _BURSTS = (6, 10)
 """Steps on the table."""
