@@ -152,6 +152,16 @@ def test_materialized_values_are_computed_in_one_loop():
     assert compiled(lambda x: three(x, False), x).count(" sine(") == 3
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("shape", [(8,), (2, 8)])
+def test_materialized_values_are_the_same_to_the_last_digit(dtype, shape):
+    tiny, huge = np.finfo(dtype).tiny, np.finfo(dtype).max
+    values = np.broadcast_to(np.array([0.0, 1.0, -np.pi, tiny, huge, -huge, np.inf, -np.inf], dtype), shape)
+    for kept, value in zip(jax.jit(materialize)((values, -values)), (values, -values), strict=True):
+        assert kept.dtype == dtype
+        np.testing.assert_array_equal(np.asarray(kept), value)
+
+
 def test_the_inward_pass_is_computed_once():
     """A reduce with all six results of inertia or momentum, and each sine's polynomial once for each joint."""
     robot = reojax.robots.prototype()
