@@ -46,6 +46,8 @@ class Sensors(NamedTuple):
     """Size of an encoder's count at the joint [rad]."""
     servo: float
     """Time constant of the joints' servos, of second order [s]."""
+    speed: float = np.inf
+    """Fastest that a joint turns [rad/s]."""
 
 
 def fly(
@@ -85,7 +87,8 @@ def fly(
         gap, decay = theta - aim, jnp.exp(-TICK / sensors.servo)  # the servo follows what it was told
         slope = theta_rate + gap / sensors.servo
         after = aim + (gap + TICK * slope) * decay
-        theta_rate = (theta_rate - TICK / sensors.servo * slope) * decay
+        after = theta + jnp.clip(after - theta, -sensors.speed * TICK, sensors.speed * TICK)
+        theta_rate = jnp.clip((theta_rate - TICK / sensors.servo * slope) * decay, -sensors.speed, sensors.speed)
         rotation, momentum = jax.lax.fori_loop(
             0, _FINE, partial(truth_step, begin=theta, end=after), (rotation, momentum)
         )
