@@ -151,10 +151,9 @@ def _true_step(
     true[0] = 1
     amplitudes = np.stack([rows.x[0], rows.x[1], last])[:, used]
     true[:, used] = true_rotations(context.robot, context.layout, amplitudes, accuracy)
-
     program = _programs(targets).refine
 
-    def step(word: Word, x: np.ndarray, part: slice) -> tuple[np.ndarray, ...]:
+    def step(word: Word, x: np.ndarray, part: slice) -> Sequence:
         known, soft = _pad(true[..., part], word.letter.shape, 0.0), _pad(strength[part], x.shape[-1:], 1.0)
         known[0, word.letter < 0] = 1.0
         return program(context.table, word, x, known, soft)
