@@ -76,8 +76,6 @@ class RotationProblem(NamedTuple):
     """Whether it is by the path too."""
     rolled: bool = False
     """Whether the passes over the tree are loops over joints."""
-    beside: bool = False
-    """Whether the derivative is computed beside it: then by the same operations, which XLA does once for both."""
 
     def short(self) -> tuple["RotationProblem", int] | None:
         """The problem for a short program, and the designs up to which it is used."""
@@ -112,7 +110,7 @@ def _end_rotation(problem: RotationProblem, numbers: Parameters, points: jax.Arr
 
 @partial(_end_rotation.defjvp, symbolic_zeros=True)
 def _end_rotation_jvp(problem, primals, tangents):
-    rotation = _end_rotation(problem._replace(beside=True), *primals)
+    rotation = _end_rotation(problem, *primals)
     numbers, points = primals
     by_numbers, by_points = tangents
     varied = [change for change in by_numbers if not isinstance(change, SymbolicZero)]
@@ -136,11 +134,7 @@ def _nodes(problem: RotationProblem, points: jax.Array) -> int:
 
 
 def _rotation(problem: RotationProblem, numbers: jax.Array, points: jax.Array) -> list[jax.Array]:
-    if problem.beside and not problem.rolled:
-        step = _unrolled_solution(problem, split(numbers), points)[0].step
-    else:
-        step = _steps_of_path(problem, numbers, points)
-    return [to_matrix(ordered_product(step.rotation))]
+    return [to_matrix(ordered_product(_steps_of_path(problem, numbers, points).rotation))]
 
 
 def _steps_of_path(problem: RotationProblem, numbers: jax.Array, points: jax.Array) -> Step:
