@@ -1,6 +1,6 @@
 """How much less do the joints move on a free closed path than in manoeuvres A and B, to the same orientation?
 
-    python experiments/free_paths.py            # a minute on 2 cores
+    python experiments/free_paths.py            # 75 s on 2 cores
     python experiments/free_paths.py --quick    # 4 targets that two manoeuvres reach
 
 Uniformly random targets (Haar), the prototype, twist within 270 degrees and bend within 120. For each target the word
